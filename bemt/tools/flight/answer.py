@@ -60,6 +60,7 @@ class FlightAnswer:
     # By how much the left motors are driven harder than the right ones, the front ones than the rear ones, and those
     # that turn to the left than those that turn to the right; empty without a layout [1]
     balance: tuple[float, ...] = ()
+    drives: tuple[float, ...] = ()  # Usual drive of each motor over their mean, less one [1]
     limited: tuple[float, ...] = ()  # Share of the time at full command, of each motor [1]
     change: FlightChange | None = None  # A change within the flight
     # At the frequencies of the rotors
@@ -157,7 +158,9 @@ def answer_on(
     shake, calm = vibration(log), [vibration(h) for h in healthy]
     moved, turned = shaken(shake, calm), speed_changes(log, healthy)
     changed, days = change_in(log, placed), sessions(log, healthy, stated_days, day)
+    mass = _by_healthy(log, found, healthy, healthy_mass_kg)
     balance: tuple[float, ...] = ()
+    drives: tuple[float, ...] = ()
     if mine is None:
         judged = _not_flown(log)
     else:
@@ -171,12 +174,16 @@ def answer_on(
         mine, *others = at_equal_voltage([log, *(healthy[k] for k, _ in flown)], [mine, *(x for _, x in flown)])
         judged = judge(mine, others, placed, _windy(log, healthy, air), beside,
                        [days.days[k] for k, _ in flown], days.day)  # fmt: skip
+        if mass is not None and judged.next.kind == "run" and judged.said.verdict == "none":
+            step = "see whether payload and battery explain the mass; a full battery and a hover of 30 s show the rest"
+            judged = replace(judged, next=replace(judged.next, text=step))
+        usual = _usual(log)
+        drives = tuple(map(float, np.exp(usual) / np.exp(usual).mean() - 1.0))
         if placed is not None:
-            balance = tuple(2.0 * float(r) for r in axes_of(placed, log.rotors) @ _usual(log))
+            balance = tuple(2.0 * float(r) for r in axes_of(placed, log.rotors) @ usual)
     return FlightAnswer(
-        log, found, judged, air, balance, _limited(log), changed, shake, moved, turned, inflow(log),
-        _by_healthy(log, found, healthy, healthy_mass_kg), simulator=simulator_constants(log, found),
-        curve=thrust_curve(log), days=days, demand=_demand(log),
+        log, found, judged, air, balance, drives, _limited(log), changed, shake, moved, turned, inflow(log), mass,
+        simulator=simulator_constants(log, found), curve=thrust_curve(log), days=days, demand=_demand(log),
     )  # fmt: skip
 
 

@@ -345,9 +345,16 @@ def _said(said: Decision, P: Mapping[Explanation, float], given: int) -> Decisio
         why = "the shares moved as they do from one day to another; three healthy flights of the same day would tell"
         return replace(said, leading=elsewhere, why=why)
     if not given:
-        why = "no motor stands out by more than in healthy vehicles; give three or more healthy flights with --healthy"
+        return replace(said, why="no motor stands out by more than in healthy vehicles")
+    likely = sorted(P.items(), key=lambda kv: -kv[1])
+    first, share = likely[0][0], f"{100.0 * likely[0][1]:.0f} %"
+    if first == NONE:
+        return replace(said, why=f"most likely ({share}) flights merely differ so, but that is not sure enough")
+    if first == UNKNOWN:
+        why = f"the balance moved, most likely ({share}) as no listed cause moves it, but that is not sure enough"
         return replace(said, why=why)
-    return said
+    named = [f"{' and '.join(e)} ({100.0 * p:.0f} %)".replace(", motor ", " at motor ") for e, p in likely if e.ids]
+    return replace(said, why=f"several causes fit, none well enough: {', '.join(named[:3])}")
 
 
 def _claimed(said: Decision, faults: Sequence[str]) -> Decision:
