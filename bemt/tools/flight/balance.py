@@ -86,10 +86,9 @@ def features(log: FlightLog) -> Array | None:
 def at_equal_voltage(flights: Sequence[FlightLog], x: Sequence[Array]) -> list[Array]:
     """Features x, (B,) each, of flights of one vehicle, as at the battery voltage of the first; healthy but for that.
 
-    A command that is the share of the battery's voltage at a motor grows as that sags; one that the autopilot
-    scales by it (Crazyflie's `motor.m` beside `pwm`, MOT_BAT_VOLT_MAX) does not. Which it is, the totals of the healthy
-    flights say (their scatter pooled with :data:`TOTAL`); each is as likely beforehand. Unchanged where a voltage is
-    missing.
+    A command that is the share of the battery's voltage at a motor grows as that sags; one that the autopilot scales by
+    it does not. Which it is, the log's `duty` and the totals of the healthy flights say, whose scatter is pooled with
+    :data:`TOTAL`. Unchanged where a voltage is missing.
     """
     read = [np.zeros(0) if f.voltage is None or f.command is None else f.voltage[f.flying] for f in flights]
     # A voltage that never moves in flight was not measured.
@@ -99,8 +98,9 @@ def at_equal_voltage(flights: Sequence[FlightLog], x: Sequence[Array]) -> list[A
     lower = np.log(volts / volts[0])
     totals = np.array([v.mean() for v in x[1:]])
     by = [(len(totals) - 1) * float(np.var(totals + share * lower[1:])) for share in (0.0, 1.0)]
-    odds = 0.5 * (len(totals) - 1 + TOTAL_FREE) * np.diff(np.log1p(np.array(by) / (TOTAL_FREE * TOTAL**2)))[0]
-    return [v + u / (1.0 + np.exp(odds)) for v, u in zip(x, lower, strict=True)]
+    free, prior = len(totals) - 1 + TOTAL_FREE, flights[0].duty
+    scaled, share = (1.0 + np.array(by) / (TOTAL_FREE * TOTAL**2)) ** (-0.5 * free) * [1.0 - prior, prior]
+    return [v + u * float(share / (scaled + share)) for v, u in zip(x, lower, strict=True)]
 
 
 def axes_of(layout: Array | None, rotors: int) -> Array:

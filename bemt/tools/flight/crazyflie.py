@@ -71,6 +71,9 @@ def from_columns(name: str, kind: str, columns: dict[str, tuple[Array, Array]], 
     command = first(
         *(([form.format(i) for i in "1234"], share) for form in ("motor.m{}", "pwm.m{}_pwm", "motor.m{}req"))
     )
+    asked, sent = many(*(f"motor.m{i}" for i in "1234")), many(*(f"pwm.m{i}_pwm" for i in "1234"))
+    # With both, the first is thrust, before the firmware divides by the battery's voltage (motors.c).
+    duty = 0.5 if asked and not sent else 0.0 if asked and sent and not np.array_equal(asked[1], sent[1]) else 1.0
     demand, said = many("controller.cmd_roll", "controller.cmd_pitch", "controller.cmd_yaw", factor=share), ""
     thrust = one("controller.cmd_thrust", share)
     if command is None and demand is not None and thrust is not None:
@@ -102,4 +105,4 @@ def from_columns(name: str, kind: str, columns: dict[str, tuple[Array, Array]], 
     }
     main = "command" if command else "rpm"
     raw = many(*acc, factor=G0, whole=True)
-    return joined(name, kind, sources, main, raw=raw, layout="crazyflie", ends=ends, mixed=said)
+    return joined(name, kind, sources, main, raw=raw, layout="crazyflie", ends=ends, mixed=said, duty=duty)

@@ -114,7 +114,11 @@ def judge(
     label = np.array(days if len(days) == n else [0] * n, dtype=int)
     sure = posterior(flight, calm, layout, windy, beside, label, day)
     change = flight - (calm.mean(axis=0) if n else flight.mean())
-    half = float(stats.t.ppf(0.975, n - 1 + TOTAL_FREE)) * _total_sd(calm) if n > 1 else float("nan")
+    half = float("nan")
+    if n > 1:
+        # What the healthy flights show, and no less than what flights of other vehicles differ by at one voltage.
+        own = float(stats.t.ppf(0.975, n - 1) * calm.mean(axis=1).std(ddof=1) * np.sqrt(1.0 + 1.0 / n))
+        half = max(own, float(stats.t.ppf(0.975, n - 1 + TOTAL_FREE)) * _total_sd(calm))
     cause = beside.change.causes if beside.change is not None else ()
     out = FlightVerdict(
         sure.said, change - change.mean(), next_flight(sure.said, layout, n), sure.found, sure.P, sure.scatter,

@@ -64,6 +64,7 @@ class FlightLog:
     raw_unit: str = "m/s2"
     # Unit of the commands; layout that the log states or the format usually has, may be empty
     command_unit: str = "1"
+    duty: float = 0.5  # Probability, by what was logged, that commands are shares of the battery's voltage [1]
     layout: str = ""
     # Half the sample interval of each quantity's source: how far a value may lie from its time [s]
     join_s: dict[str, float] = field(default_factory=dict)

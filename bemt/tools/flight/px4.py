@@ -85,7 +85,10 @@ def _reduced(file: BinaryIO) -> io.BytesIO:
             elif kind in b"FPQ":
                 head += data[at:after]
             at = after
-    return io.BytesIO(b"".join([head, *(part for m in topics.values() for part in (*m.kept.parts, m.begun))]))
+    parts: list[bytes | bytearray | memoryview] = [head]
+    for messages in topics.values():
+        parts += [*(part.data for part in messages.kept.parts), messages.begun]
+    return io.BytesIO(b"".join(parts))
 
 
 class _Messages:
