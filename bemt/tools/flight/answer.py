@@ -14,10 +14,10 @@ from bemt.base.errors import Fault, InputError, refuse
 from bemt.judge.diagnose.suggest import Suggestion
 from bemt.judge.explanation import NONE
 from bemt.judge.loss import Decision
-from bemt.tools.flight.balance import at_equal_voltage, axes_of, features
+from bemt.tools.flight.balance import LOADED, TOTAL_FREE, at_equal_voltage, axes_of, battery_volts, features
 from bemt.tools.flight.change import FlightChange, change_in
 from bemt.tools.flight.identify import Constant, Identified, identify
-from bemt.tools.flight.judge import BesideBalance, FlightVerdict, judge
+from bemt.tools.flight.judge import BesideBalance, FlightVerdict, judge, total_sd
 from bemt.tools.flight.layout import layout_of, mass_faults
 from bemt.tools.flight.log import FlightLog
 from bemt.tools.flight.repeat import Sessions, flight_scatter, sessions
@@ -34,6 +34,11 @@ SPEED_POWER, SPEED_POWER_HALF = 0.05, 0.1
 """Power of the speed with which a thrust constant grows as the Reynolds number does, and the half width of its 95 %
 band: -0.02 to 0.10 above 8,000 or 15,000 rev/min on benches of a Crazyflie (IMRCLab/crazyflie-data-collection @
 4d777a5a) [1]."""
+
+
+COMMAND_POWER, COMMAND_POWER_HALF = 1.5, 0.5
+"""Power of the command with which thrust grows, and the half width of its 95 % band: from a command that is thrust to
+one that is speed [1]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,12 +272,34 @@ def _windy(log: FlightLog, healthy: Sequence[FlightLog], air: Wind) -> bool:
 def _mass(log: FlightLog, mine: Constant, known: Sequence[tuple[FlightLog, Constant]], healthy_mass: float) -> Constant:
     """Mass at which this flight's thrust constant is that of the healthy ones, with what flights differ by."""
     values = np.array([k.value for _, k in known])
+    if log.rpm is None:
+        return _mass_by_commands(log, mine, known, healthy_mass)
     m = healthy_mass * float(values.mean()) / mine.value
     # Not narrowed by the healthy flights: another load is what they cannot show (a payload weighs 2 % too little).
     sd, factor = flight_scatter([])
     between = factor * sd * np.sqrt(1.0 + 1.0 / values.size)
-    speeds = [float(h.rpm[h.flying].mean()) for h, _ in known if h.rpm is not None]
-    faster = 0.0 if log.rpm is None else float(np.log(log.rpm[log.flying].mean() / np.mean(speeds)))
+    faster = float(np.log(log.rpm[log.flying].mean() / np.mean([h.rpm[h.flying].mean() for h, _ in known])))  # type: ignore[index]
     m *= float(np.exp(SPEED_POWER * faster))
     parts = (mine.half / mine.value, between, SPEED_POWER_HALF * faster)
+    return Constant(m, m * float(np.linalg.norm(parts)), "kg")
+
+
+def _mass_by_commands(
+    log: FlightLog, mine: Constant, known: Sequence[tuple[FlightLog, Constant]], healthy_mass: float
+) -> Constant:  # fmt: skip
+    """The same where no speed was logged: commands at one battery voltage, on a curve that is not known."""
+    from scipy import stats
+
+    flights = [log, *(h for h, _ in known)]
+    x = [np.log(f.drive[f.flying].mean(axis=0)) for f in flights]  # type: ignore[index]
+    even = np.array(at_equal_voltage(flights, x))
+    harder = float(np.mean(np.log([k.value for _, k in known]))) - float(np.log(mine.value))
+    moved = (even - x).mean(axis=1)
+    harder += float(moved[0] - moved[1:].mean())
+    free = len(known) - 1 + TOTAL_FREE
+    between = float(stats.t.ppf(0.975, free)) * total_sd(even[1:])
+    if log.duty > 0.0 and any(battery_volts(f) is None for f in flights):
+        between = float(np.hypot(between, LOADED))
+    m = healthy_mass * float(np.exp(COMMAND_POWER * harder))
+    parts = (COMMAND_POWER * mine.half / mine.value, COMMAND_POWER * between, COMMAND_POWER_HALF * harder)
     return Constant(m, m * float(np.linalg.norm(parts)), "kg")

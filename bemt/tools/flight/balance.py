@@ -39,7 +39,7 @@ from bemt.tools.flight.log import FlightLog
 
 __all__ = [
     "ALARM", "BLADE", "BUILD", "DAY", "IMBALANCE", "LARGEST", "WEAK", "WEIGHT", "WIDE", "WIND", "HealthyFlight",
-    "at_equal_voltage", "axes_of", "blade", "differ", "directions", "features", "healthy_flight",
+    "at_equal_voltage", "axes_of", "battery_volts", "blade", "differ", "directions", "features", "healthy_flight",
 ]  # fmt: skip
 
 ALARM = 0.01
@@ -83,6 +83,12 @@ def features(log: FlightLog) -> Array | None:
     return np.log(mean) if np.all(mean > 0.0) else None
 
 
+def battery_volts(log: FlightLog) -> float | None:
+    """Mean voltage of the battery in flight [V]; None where none was measured beside commands: one that never moves."""
+    v = np.zeros(0) if log.voltage is None or log.command is None else log.voltage[log.flying]
+    return float(v.mean()) if v.size and np.ptp(v) > 1e-9 and v.mean() > 0.0 else None
+
+
 def at_equal_voltage(flights: Sequence[FlightLog], x: Sequence[Array]) -> list[Array]:
     """Features x, (B,) each, of flights of one vehicle, as at the battery voltage of the first; healthy but for that.
 
@@ -90,11 +96,10 @@ def at_equal_voltage(flights: Sequence[FlightLog], x: Sequence[Array]) -> list[A
     it does not. Which it is, the log's `duty` and the totals of the healthy flights say, whose scatter is pooled with
     :data:`TOTAL`. Unchanged where a voltage is missing.
     """
-    read = [np.zeros(0) if f.voltage is None or f.command is None else f.voltage[f.flying] for f in flights]
-    # A voltage that never moves in flight was not measured.
-    if len(x) < 2 or any(v.size == 0 or np.ptp(v) < 1e-9 or v.mean() <= 0.0 for v in read):
+    read = [battery_volts(f) for f in flights]
+    if len(x) < 2 or any(v is None for v in read):
         return list(x)
-    volts = np.array([v.mean() for v in read])
+    volts = np.array(read, dtype=float)
     lower = np.log(volts / volts[0])
     totals = np.array([v.mean() for v in x[1:]])
     by = [(len(totals) - 1) * float(np.var(totals + share * lower[1:])) for share in (0.0, 1.0)]

@@ -43,7 +43,7 @@ from bemt.tools.flight.balance import (
 )
 from bemt.tools.flight.change import FlightChange, FlightEvidence, FlightReadings
 
-__all__ = ["ELSEWHERE", "BesideBalance", "FlightVerdict", "judge", "posterior"]
+__all__ = ["ELSEWHERE", "BesideBalance", "FlightVerdict", "judge", "posterior", "total_sd"]
 
 ELSEWHERE = (DAY, BUILD, WIDE)
 """Explanations that say nothing of a fault: the healthy flights are of another day, or the vehicle is of its own."""
@@ -118,7 +118,7 @@ def judge(
     if n > 1:
         # What the healthy flights show, and no less than what flights of other vehicles differ by at one voltage.
         own = float(stats.t.ppf(0.975, n - 1) * calm.mean(axis=1).std(ddof=1) * np.sqrt(1.0 + 1.0 / n))
-        half = max(own, float(stats.t.ppf(0.975, n - 1 + TOTAL_FREE)) * _total_sd(calm))
+        half = max(own, float(stats.t.ppf(0.975, n - 1 + TOTAL_FREE)) * total_sd(calm))
     cause = beside.change.causes if beside.change is not None else ()
     out = FlightVerdict(
         sure.said, change - change.mean(), next_flight(sure.said, layout, n), sure.found, sure.P, sure.scatter,
@@ -209,11 +209,11 @@ def _worlds(calm: Array, axes: Array, known: bool, days: Array, day: int | None 
 
 def _totals(w: _World, calm: Array) -> list[_World]:
     """The same where the total drive repeats as between flights, and where mass, battery or air are others."""
-    return [replace(w, log=w.log + float(np.log(share)), total=float(np.hypot(_total_sd(calm), more)))
+    return [replace(w, log=w.log + float(np.log(share)), total=float(np.hypot(total_sd(calm), more)))
             for share, more in ((1.0 - _LOADED, 0.0), (_LOADED, LOADED))]  # fmt: skip
 
 
-def _total_sd(calm: Array) -> float:
+def total_sd(calm: Array) -> float:
     """Standard deviation of the total drive of the next flight about the mean of the healthy ones, pooled [1]."""
     n, totals = len(calm), calm.mean(axis=1)
     square = (float(np.sum((totals - totals.mean()) ** 2)) + TOTAL_FREE * TOTAL**2) / (n - 1 + TOTAL_FREE)
