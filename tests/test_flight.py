@@ -69,6 +69,26 @@ def test_constants_for_a_simulator(script: dict[str, Any], flights: Path) -> Non
     assert "motor time constant" not in got, "these motors follow at once"
 
 
+@pytest.mark.parametrize("induced", [4.0, 5.5, 8.0])
+@pytest.mark.parametrize("seen", [True, False])
+def test_thrust_constant_is_that_of_hover(induced: float, seen: bool) -> None:
+    """Air across the disks lifts a flight; with and without an accelerometer the band holds the hover's constant."""
+    t = np.arange(0.0, 40.0, 0.01)
+    v = np.stack([2.0 * np.sin(0.7 * t), 1.5 * np.cos(0.9 * t), 0.0 * t], axis=1)
+    flow = np.sum(v**2, axis=1) / induced**2
+    left = np.sqrt(np.sqrt(1.0 + flow**2 / 4.0) - flow / 2.0)
+    np.testing.assert_allclose(left**2 * (left**2 + flow), 1.0)
+    k, rng = 2e-10, np.random.default_rng(3)
+    square = 9.80665 / (4.0 * k * (1.0 + 0.7 * (1.0 - left)))
+    rpm = np.sqrt(square)[:, None] * (1.0 + 0.002 * rng.normal(size=(t.size, 4)))
+    lift = np.stack([0.0 * t, 0.0 * t, 9.80665 + 0.05 * rng.normal(size=t.size)], axis=1)
+    up = np.tile([0.0, 0.0, 1.0], (t.size, 1))
+    log = FlightLog("f", "made", t, rpm=rpm, velocity=v, axis=up, acceleration=lift if seen else None)
+    found, still = (identify(x, 1.0).constants["thrust constant"] for x in (log, replace(log, velocity=0.0 * v)))
+    assert abs(found.value - k) < found.half < 0.05 * k and found.value < still.value
+    assert not seen or abs(found.value / k - 1.0) < 0.005
+
+
 @pytest.mark.parametrize("tau", [0.03, 0.1])
 def test_motor_lag_is_found_or_not_stated(tau: float) -> None:
     """A lag comes back within its band; speed that moves by itself, or a log without speeds, has none."""

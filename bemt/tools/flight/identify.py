@@ -137,7 +137,7 @@ def _hovering(log: FlightLog, on: NDArray[np.bool_], weight: Constant) -> Consta
     lift = np.zeros(0) if log.acceleration is None else log.acceleration[on, 2]
     if lift.size >= 20 * BATCHES and np.all(lift > 0.0) and np.all(square > 0.0) and np.ptp(gone) > 0.0:
         c, u = jackknifed(np.column_stack([gone, along, np.ones(lift.size)]), np.log(lift / square))
-        own = float(u[0] ** -2)
+        own = float(max(u[0], 1e-6) ** -2)
         gain = (precision * gain + own * float(c[0])) / (precision + own)
         precision += own
     gone_mean = float(gone.mean())
