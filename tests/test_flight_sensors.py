@@ -13,7 +13,7 @@ from flight_files import Hover, dataflash, ulog
 from bemt.base.errors import InputError
 from bemt.tools.flight.actions import fly
 from bemt.tools.flight.answer import answer_on
-from bemt.tools.flight.balance import DAY, SESSION, axes_of, features, healthy_flight
+from bemt.tools.flight.balance import DAY, SESSION, at_equal_voltage, axes_of, features, healthy_flight
 from bemt.tools.flight.identify import identify
 from bemt.tools.flight.judge import judge, posterior
 from bemt.tools.flight.layout import LAYOUTS, layout_of, mixed
@@ -333,3 +333,26 @@ def test_the_first_line_is_for_a_pilot(tmp_path: Path) -> None:
     assert got[0].startswith("Look at motor 3: it works ") and "damaged blade" in got[0] and got[2].startswith("Next: ")
     assert len(got) == 3 and "motor" not in pilot(answer_on(hover(seed=9), calm, day="same"))[0].split(":")[0]
     assert DAY not in got[0]
+
+
+def test_recorded_totals_at_one_voltage(shared_data: Path) -> None:
+    """Commands of one vehicle differ by 3 % as its battery does; what its motors get by 0.5 % at most."""
+    files = [p for p in (shared_data / "flight_logs").rglob("*brushed_34.7g*.usdlog") if p.stem not in IMRC]
+    logs = [read_log(p) for p in sorted(files)]
+    raw = [x for log in logs if (x := features(log)) is not None]
+    even = at_equal_voltage(logs, raw)
+    assert np.std([x.mean() for x in raw]) > 0.02 and np.std([x.mean() for x in even]) < 0.005
+    for x, y in zip(raw, even, strict=True):
+        assert np.allclose(x - x.mean(), y - y.mean()), "shares stay"
+
+
+def test_commands_that_hold_the_voltage_already_stay(shared_data: Path) -> None:
+    """A Crazyflie that logs both says so; of another, flights at one voltage leave it open, and a stuck one is none."""
+    log = read_log(shared_data / "flight_logs" / "crazypad_E8" / "normal_flight__log01.usdlog")
+    assert log.duty == 0.0 and log.voltage is not None
+    x, low = np.zeros(4), replace(log, voltage=0.9 * log.voltage)
+    assert np.allclose(at_equal_voltage([log, low], [x, x])[1], 0.0)
+    open_ = replace(log, duty=0.5)
+    assert np.allclose(at_equal_voltage([open_, low], [x, x])[1], 0.5 * np.log(0.9))
+    stuck = replace(open_, voltage=0.0 * log.voltage + 3.7)
+    assert np.allclose(at_equal_voltage([stuck, low], [x, x])[1], 0.0)

@@ -14,6 +14,7 @@ import re
 import struct
 import zlib
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,7 @@ from bemt.physics.dataset import Dataset
 CRAZYFLIE_LOG = "crazyflie_log"
 MAGIC = 0xBC
 _TIMES = {1: struct.Struct("<HI"), 2: struct.Struct("<HQ")}
-_LETTERS = "bBhHiIlLqQefd"
+_LETTERS = dict(zip("bBhHiIlLqQefd", "i1 u1 <i2 <u2 <i4 <u4 <i4 <u4 <i8 <u8 <f2 <f4 <f8".split(), strict=True))
 _UNITS = {
     "stateEstimate.x": ("x_m", 1.0), "stateEstimate.y": ("y_m", 1.0), "stateEstimate.z": ("height_m", 1.0),
     "stateEstimate.vx": ("velocity_x_m_s", 1.0), "stateEstimate.vy": ("velocity_y_m_s", 1.0),
@@ -66,59 +67,65 @@ def read_crazyflie_log(path: str | os.PathLike[str]) -> Dataset:
     return _made(log.file, hashlib.sha256(data).hexdigest(), tables)
 
 
-def _text(data: bytes, at: int) -> tuple[str, int]:
-    end = data.index(b"\0", at)
-    return data[at:end].decode("utf-8"), end + 1
+def _text(data: bytes | memoryview, at: int) -> tuple[str, int]:
+    text, end, _ = bytes(data[at : at + 256]).partition(b"\0")
+    if not end:
+        raise ValueError("a name without an end")
+    return text.decode("utf-8"), at + len(text) + 1
 
 
-def log_tables(data: bytes, partly: bool = False) -> tuple[dict[str, dict[str, NDArray[np.float64]]], int]:
-    """Event to variable to (N,) values in the units of the log, and the place at which reading ended.
+def log_tables(data: bytes | memoryview, partly: bool = False) -> tuple[dict[str, dict[str, NDArray[Any]]], int]:
+    """Event to variable to (N,) values in the units and type of the log, and the place at which reading ended.
 
     `data` is the file without its checksum; `time_s` is in seconds of the log's clock. `partly`: keep what stands
     before a damaged record instead of raising.
     """
     version, events = struct.unpack_from("<HH", data, 1)
-    at, known = 5, {}
+    at, known, stamp = 5, {}, _TIMES[version]
     for _ in range(events):
         (number,) = struct.unpack_from("<H", data, at)
         name, at = _text(data, at + 2)
         (count,) = struct.unpack_from("<H", data, at)
         at += 2
-        names, form = [], "<"
+        names, form = [], ""
         for _ in range(count):
             variable, at = _text(data, at)
             if variable[-2] not in _LETTERS:
                 raise ValueError(f"type {variable[-2]!r}")
             names.append(variable[:-3])
             form += variable[-2]
-        known[number] = (name, names, struct.Struct(form))
-    rows: dict[int, list[tuple[float, ...]]] = {k: [] for k in known}
-    stamp, scale = _TIMES[version], 1e-6
+        row = np.dtype([("", _LETTERS[c]) for c in "H" + stamp.format[-1] + form])
+        known[number] = (name, names, row, bytearray())
     while at < len(data):
         try:
-            number, time = stamp.unpack_from(data, at)
-            record = known[number][2]
-            rows[number].append((time * scale, *record.unpack_from(data, at + stamp.size)))
+            _, _, row, rows = known[stamp.unpack_from(data, at)[0]]
         except (struct.error, KeyError):
             if not partly:
                 raise
             break
-        at += stamp.size + record.size
+        if at + row.itemsize > len(data):
+            if not partly:
+                raise ValueError("the last record is cut")
+            break
+        rows += data[at : at + row.itemsize]
+        at += row.itemsize
     out = {}
-    for number, (name, names, _) in known.items():
-        table = np.array(rows[number], dtype=float).reshape(-1, len(names) + 1)
-        out[name] = {"time_s": table[:, 0]} | {n: table[:, k + 1] for k, n in enumerate(names)}
+    for name, names, row, rows in known.values():
+        table = np.frombuffer(rows, dtype=row)
+        time, *values = list(table.dtype.names or ())[1:]
+        out[name] = {"time_s": 1e-6 * table[time]} | {n: table[v] for n, v in zip(names, values, strict=True)}
     return out, at
 
 
-def _made(name: str, sha256: str, tables: dict[str, dict[str, NDArray[np.float64]]]) -> Dataset:
+def _made(name: str, sha256: str, tables: dict[str, dict[str, NDArray[Any]]]) -> Dataset:
     main = max(tables, key=lambda k: tables[k]["time_s"].size)
     t = tables[main]["time_s"]
     columns: dict[str, NDArray[np.float64]] = {}
     for table in tables.values():
         for key, v in table.items():
             if key != "time_s":
-                columns.setdefault(key, v if table is tables[main] else np.interp(t, table["time_s"], v))
+                same = table is tables[main]
+                columns.setdefault(key, v.astype(float) if same else np.interp(t, table["time_s"], v))
     channels = {"time_s": Channel(t - t[0], "s")}
     for key, v in columns.items():
         if key in _UNITS:

@@ -14,10 +14,10 @@ from bemt.base.errors import Fault, InputError, refuse
 from bemt.judge.diagnose.suggest import Suggestion
 from bemt.judge.explanation import NONE
 from bemt.judge.loss import Decision
-from bemt.tools.flight.balance import axes_of, features
+from bemt.tools.flight.balance import LOADED, TOTAL_FREE, at_equal_voltage, axes_of, battery_volts, features
 from bemt.tools.flight.change import FlightChange, change_in
 from bemt.tools.flight.identify import Constant, Identified, identify
-from bemt.tools.flight.judge import BesideBalance, FlightVerdict, judge
+from bemt.tools.flight.judge import BesideBalance, FlightVerdict, judge, total_sd
 from bemt.tools.flight.layout import layout_of, mass_faults
 from bemt.tools.flight.log import FlightLog
 from bemt.tools.flight.repeat import Sessions, flight_scatter, sessions
@@ -30,9 +30,15 @@ _BREEZE = 2.0  # wind, or speed over ground beyond that of healthy flights, that
 _FULL = 0.98  # share of full drive that is a limit [1]
 _NEAR_LIMIT = 0.5  # demand in yaw that few mixers can give in full [1]
 
-SPEED_POWER = 0.1
-"""Bound (95 %) on the power of the speed with which a thrust constant changes as the speed does: -0.02 to 0.10 above
-8,000 or 15,000 rev/min on three benches of a Crazyflie (IMRCLab/crazyflie-data-collection @ 4d777a5a) [1]."""
+SPEED_POWER, SPEED_POWER_HALF = 0.05, 0.1
+"""Power of the speed with which a thrust constant grows as the Reynolds number does, and the half width of its 95 %
+band: -0.02 to 0.10 above 8,000 or 15,000 rev/min on benches of a Crazyflie (IMRCLab/crazyflie-data-collection @
+4d777a5a) [1]."""
+
+
+COMMAND_POWER, COMMAND_POWER_HALF = 1.5, 0.5
+"""Power of the command with which thrust grows, and the half width of its 95 % band: from a command that is thrust to
+one that is speed [1]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +65,7 @@ class FlightAnswer:
     # By how much the left motors are driven harder than the right ones, the front ones than the rear ones, and those
     # that turn to the left than those that turn to the right; empty without a layout [1]
     balance: tuple[float, ...] = ()
+    drives: tuple[float, ...] = ()  # Usual drive of each motor over their mean, less one [1]
     limited: tuple[float, ...] = ()  # Share of the time at full command, of each motor [1]
     change: FlightChange | None = None  # A change within the flight
     # At the frequencies of the rotors
@@ -156,7 +163,9 @@ def answer_on(
     shake, calm = vibration(log), [vibration(h) for h in healthy]
     moved, turned = shaken(shake, calm), speed_changes(log, healthy)
     changed, days = change_in(log, placed), sessions(log, healthy, stated_days, day)
+    mass = _by_healthy(log, found, healthy, healthy_mass_kg)
     balance: tuple[float, ...] = ()
+    drives: tuple[float, ...] = ()
     if mine is None:
         judged = _not_flown(log)
     else:
@@ -167,14 +176,19 @@ def answer_on(
             tuple(k + 1 for k, part in turned if part > 0.0), tuple(k + 1 for k, part in turned if part < 0.0),
             tuple(k + 1 for k, _, known in moved if known), changed, tuple(upset),
         )  # fmt: skip
-        judged = judge(mine, [x for _, x in flown], placed, _windy(log, healthy, air), beside,
+        mine, *others = at_equal_voltage([log, *(healthy[k] for k, _ in flown)], [mine, *(x for _, x in flown)])
+        judged = judge(mine, others, placed, _windy(log, healthy, air), beside,
                        [days.days[k] for k, _ in flown], days.day)  # fmt: skip
+        if mass is not None and judged.next.kind == "run" and judged.said.verdict == "none":
+            step = "see whether payload and battery explain the mass; a full battery and a hover of 30 s show the rest"
+            judged = replace(judged, next=replace(judged.next, text=step))
+        usual = _usual(log)
+        drives = tuple(map(float, np.exp(usual) / np.exp(usual).mean() - 1.0))
         if placed is not None:
-            balance = tuple(2.0 * float(r) for r in axes_of(placed, log.rotors) @ _usual(log))
+            balance = tuple(2.0 * float(r) for r in axes_of(placed, log.rotors) @ usual)
     return FlightAnswer(
-        log, found, judged, air, balance, _limited(log), changed, shake, moved, turned, inflow(log),
-        _by_healthy(log, found, healthy, healthy_mass_kg), simulator=simulator_constants(log, found),
-        curve=thrust_curve(log), days=days, demand=_demand(log),
+        log, found, judged, air, balance, drives, _limited(log), changed, shake, moved, turned, inflow(log), mass,
+        simulator=simulator_constants(log, found), curve=thrust_curve(log), days=days, demand=_demand(log),
     )  # fmt: skip
 
 
@@ -258,9 +272,34 @@ def _windy(log: FlightLog, healthy: Sequence[FlightLog], air: Wind) -> bool:
 def _mass(log: FlightLog, mine: Constant, known: Sequence[tuple[FlightLog, Constant]], healthy_mass: float) -> Constant:
     """Mass at which this flight's thrust constant is that of the healthy ones, with what flights differ by."""
     values = np.array([k.value for _, k in known])
+    if log.rpm is None:
+        return _mass_by_commands(log, mine, known, healthy_mass)
     m = healthy_mass * float(values.mean()) / mine.value
-    sd, factor = flight_scatter(values)
+    # Not narrowed by the healthy flights: another load is what they cannot show (a payload weighs 2 % too little).
+    sd, factor = flight_scatter([])
     between = factor * sd * np.sqrt(1.0 + 1.0 / values.size)
-    speeds = [float(h.rpm[h.flying].mean()) for h, _ in known if h.rpm is not None]
-    slope = 0.0 if log.rpm is None else SPEED_POWER * float(np.log(log.rpm[log.flying].mean() / np.mean(speeds)))
-    return Constant(m, m * float(np.hypot(np.hypot(mine.half / mine.value, between), slope)), "kg")
+    faster = float(np.log(log.rpm[log.flying].mean() / np.mean([h.rpm[h.flying].mean() for h, _ in known])))  # type: ignore[index]
+    m *= float(np.exp(SPEED_POWER * faster))
+    parts = (mine.half / mine.value, between, SPEED_POWER_HALF * faster)
+    return Constant(m, m * float(np.linalg.norm(parts)), "kg")
+
+
+def _mass_by_commands(
+    log: FlightLog, mine: Constant, known: Sequence[tuple[FlightLog, Constant]], healthy_mass: float
+) -> Constant:  # fmt: skip
+    """The same where no speed was logged: commands at one battery voltage, on a curve that is not known."""
+    from scipy import stats
+
+    flights = [log, *(h for h, _ in known)]
+    x = [np.log(f.drive[f.flying].mean(axis=0)) for f in flights]  # type: ignore[index]
+    even = np.array(at_equal_voltage(flights, x))
+    harder = float(np.mean(np.log([k.value for _, k in known]))) - float(np.log(mine.value))
+    moved = (even - x).mean(axis=1)
+    harder += float(moved[0] - moved[1:].mean())
+    free = len(known) - 1 + TOTAL_FREE
+    between = float(stats.t.ppf(0.975, free)) * total_sd(even[1:])
+    if log.duty > 0.0 and any(battery_volts(f) is None for f in flights):
+        between = float(np.hypot(between, LOADED))
+    m = healthy_mass * float(np.exp(COMMAND_POWER * harder))
+    parts = (COMMAND_POWER * mine.half / mine.value, COMMAND_POWER * between, COMMAND_POWER_HALF * harder)
+    return Constant(m, m * float(np.linalg.norm(parts)), "kg")

@@ -39,7 +39,7 @@ from bemt.tools.flight.log import FlightLog
 
 __all__ = [
     "ALARM", "BLADE", "BUILD", "DAY", "IMBALANCE", "LARGEST", "WEAK", "WEIGHT", "WIDE", "WIND", "HealthyFlight",
-    "axes_of", "blade", "differ", "directions", "features", "healthy_flight",
+    "at_equal_voltage", "axes_of", "battery_volts", "blade", "differ", "directions", "features", "healthy_flight",
 ]  # fmt: skip
 
 ALARM = 0.01
@@ -81,6 +81,31 @@ def features(log: FlightLog) -> Array | None:
         return None
     mean = log.drive[on].mean(axis=0)
     return np.log(mean) if np.all(mean > 0.0) else None
+
+
+def battery_volts(log: FlightLog) -> float | None:
+    """Mean voltage of the battery in flight [V]; None where none was measured beside commands: one that never moves."""
+    v = np.zeros(0) if log.voltage is None or log.command is None else log.voltage[log.flying]
+    return float(v.mean()) if v.size and np.ptp(v) > 1e-9 and v.mean() > 0.0 else None
+
+
+def at_equal_voltage(flights: Sequence[FlightLog], x: Sequence[Array]) -> list[Array]:
+    """Features x, (B,) each, of flights of one vehicle, as at the battery voltage of the first; healthy but for that.
+
+    A command that is the share of the battery's voltage at a motor grows as that sags; one that the autopilot scales by
+    it does not. Which it is, the log's `duty` and the totals of the healthy flights say, whose scatter is pooled with
+    :data:`TOTAL`. Unchanged where a voltage is missing.
+    """
+    read = [battery_volts(f) for f in flights]
+    if len(x) < 2 or any(v is None for v in read):
+        return list(x)
+    volts = np.array(read, dtype=float)
+    lower = np.log(volts / volts[0])
+    totals = np.array([v.mean() for v in x[1:]])
+    by = [(len(totals) - 1) * float(np.var(totals + share * lower[1:])) for share in (0.0, 1.0)]
+    free, prior = len(totals) - 1 + TOTAL_FREE, flights[0].duty
+    scaled, share = (1.0 + np.array(by) / (TOTAL_FREE * TOTAL**2)) ** (-0.5 * free) * [1.0 - prior, prior]
+    return [v + u * float(share / (scaled + share)) for v, u in zip(x, lower, strict=True)]
 
 
 def axes_of(layout: Array | None, rotors: int) -> Array:

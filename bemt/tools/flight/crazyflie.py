@@ -18,7 +18,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import G0
 from bemt.data.readers import crazyflie
 from bemt.tools.flight.layout import layout_of, mixed
-from bemt.tools.flight.log import FlightLog, joined, thrust_axis
+from bemt.tools.flight.log import MOST, FlightLog, joined, thrust_axis
 
 KIND = "Crazyflie usdlog"
 
@@ -32,16 +32,17 @@ def read(path: Path) -> FlightLog:
     """Read a log, as far as it is whole."""
     data, name = path.read_bytes(), str(path)
     whole = len(data) > 8 and zlib.crc32(data[:-4]) == struct.unpack("<I", data[-4:])[0]
-    body = data[:-4] if whole else data
+    body, size = memoryview(data)[: -4 if whole else None], len(data)
     try:
         tables, end = crazyflie.log_tables(body, partly=True)
     except (struct.error, KeyError, ValueError, IndexError, MemoryError) as error:
         got = f"a header that cannot be read ({error})"
         raise InputError(Fault(name, "header", got, "a whole header", "Copy the file again")) from error
+    del body, data
     columns = {k: (v["time_s"], v[k]) for v in tables.values() for k in v if k != "time_s"}
     ends = ""
     if not whole:
-        where = f"records end at byte {end} of {len(data)}" if end < len(data) - 4 else "all records can be read"
+        where = f"records end at byte {end} of {size}" if end < size - 4 else "all records can be read"
         ends = f"wrong checksum; {where}"
     return from_columns(name, KIND, columns, ends)
 
@@ -52,14 +53,16 @@ _STATES = (("stateEstimate", 1.0), ("stateEstimateZ", 1e-3))
 def from_columns(name: str, kind: str, columns: dict[str, tuple[Array, Array]], ends: str = "") -> FlightLog:
     """Log from the firmware's variables, each with its times [s]."""
 
-    def many(*keys: str, factor: float = 1.0) -> tuple[Array, Array] | None:
+    def many(*keys: str, factor: float = 1.0, whole: bool = False) -> tuple[Array, Array] | None:
         if not all(k in columns for k in keys):
             return None
         t = columns[keys[0]][0]
-        return t, factor * np.stack([columns[k][1] for k in keys], axis=1)
+        step = 1 if whole else max(t.size // MOST, 1)  # what is thinned later need not be copied
+        return t[::step], factor * np.stack([columns[k][1][::step] for k in keys], axis=1, dtype=float)
 
     def one(key: str, factor: float) -> tuple[Array, Array] | None:
-        return (columns[key][0], factor * columns[key][1]) if key in columns else None
+        found = many(key, factor=factor)
+        return None if found is None else (found[0], found[1][:, 0])
 
     def first(*choices: tuple[Sequence[str], float]) -> tuple[Array, Array] | None:
         return next((found for keys, factor in choices if (found := many(*keys, factor=factor))), None)
@@ -68,6 +71,9 @@ def from_columns(name: str, kind: str, columns: dict[str, tuple[Array, Array]], 
     command = first(
         *(([form.format(i) for i in "1234"], share) for form in ("motor.m{}", "pwm.m{}_pwm", "motor.m{}req"))
     )
+    asked, sent = many(*(f"motor.m{i}" for i in "1234")), many(*(f"pwm.m{i}_pwm" for i in "1234"))
+    # With both, the first is thrust, before the firmware divides by the battery's voltage (motors.c).
+    duty = 0.5 if asked and not sent else 0.0 if asked and sent and not np.array_equal(asked[1], sent[1]) else 1.0
     demand, said = many("controller.cmd_roll", "controller.cmd_pitch", "controller.cmd_yaw", factor=share), ""
     thrust = one("controller.cmd_thrust", share)
     if command is None and demand is not None and thrust is not None:
@@ -80,10 +86,11 @@ def from_columns(name: str, kind: str, columns: dict[str, tuple[Array, Array]], 
     roll = first(*(([f"{group}.roll", f"{group}.pitch"], np.pi / 180.0) for group in groups))
     axis = (q[0], thrust_axis(q[1])) if q else None
     upright = (axis[0], axis[1][:, 2]) if axis else (roll[0], np.prod(np.cos(roll[1]), axis=1)) if roll else None
+    acc = [f"acc.{a}" for a in "xyz"]
     sources = {
         "command": command,
         "rpm": many(*(f"rpm.m{i}" for i in "1234")),
-        "acceleration": many(*(f"acc.{a}" for a in "xyz"), factor=G0),
+        "acceleration": many(*acc, factor=G0),
         "rates": many(*(f"gyro.{a}" for a in "xyz"), factor=np.pi / 180.0),
         "upright": upright,
         "axis": axis,
@@ -97,5 +104,5 @@ def from_columns(name: str, kind: str, columns: dict[str, tuple[Array, Array]], 
         "torque": demand,
     }
     main = "command" if command else "rpm"
-    raw = sources["acceleration"]
-    return joined(name, kind, sources, main, raw=raw, layout="crazyflie", ends=ends, mixed=said)
+    raw = many(*acc, factor=G0, whole=True)
+    return joined(name, kind, sources, main, raw=raw, layout="crazyflie", ends=ends, mixed=said, duty=duty)

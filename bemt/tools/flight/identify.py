@@ -3,6 +3,11 @@
 Over a flight that begins and ends at rest, the mean upward force is the weight plus m dVz/dt:
 k = m (g + dVz/dt) / mean(sum n_i^2 cos(tilt)). No accelerometer scale enters.
 Bands are from ten pieces of the flight (:mod:`bemt.tools.flight.repeat`).
+
+k is that of a hover. Air that crosses the disk takes induced velocity u v_h away, u^2 (u^2 + (V/v_h)^2) = 1 (Glauert;
+Leishman, Principles of Helicopter Aerodynamics, 2nd ed., section 2.14; not checked there), and so adds c (1 - u) of the
+thrust at one speed. Blade elements with momentum theory give c = q / (1 + q/2), q = solidity * lift slope / (8 inflow
+ratio): 0.7 for q = 1.1, as a small propeller has it. The flight's own c, from its accelerometer, is drawn to that.
 """
 
 from __future__ import annotations
@@ -26,6 +31,8 @@ if TYPE_CHECKING:
     from bemt.rotors.as_measured import AsMeasured
     from bemt.rotors.case import Case
 
+# Induced velocity of multirotors of 35 g to 3 kg in hover, 4 to 8 m/s [m/s]; c at that, and what both leave open [1]
+_HOVER_M_S, _GAIN, _GAIN_U = 5.5, 0.7, 0.45
 _APART = 0.1  # a rotor's own constant is given when its half width is below this share [1]
 
 
@@ -75,6 +82,8 @@ def identify(log: FlightLog, mass_kg: float | None = None) -> Identified:
     )
     m, per = (1.0, "/kg") if mass_kg is None else (mass_kg, "")
     weight = _balance(log, on, power.sum(axis=1) * upright)
+    if weight is not None and speeds:
+        weight = _hovering(log, on, weight)
     if weight is not None and speeds and log.sensors:
         # What the repair leaves open of the sum of squares.
         open_ = [2.0 * s.u * float(power[:, s.motor - 1].mean() / power.sum(axis=1).mean()) for s in log.sensors]
@@ -112,6 +121,28 @@ def _balance(log: FlightLog, on: NDArray[np.bool_], lift: Array) -> Constant | N
     span = float(t[-1] - t[0])
     whole = 0.0 if log.velocity is None else float(log.velocity[on, 2][-1] - log.velocity[on, 2][0]) / max(span, 1e-3)
     return Constant((G0 + whole) / float(lift.mean()), half_width(values), "1")
+
+
+def _hovering(log: FlightLog, on: NDArray[np.bool_], weight: Constant) -> Constant:
+    """The balance without what air that crosses the disks adds, where the velocity is known (over ground: calm air)."""
+    if log.velocity is None or log.axis is None or log.rpm is None:
+        return weight
+    v, axis = log.velocity[on], log.axis[on]
+    along = np.sum(v * axis, axis=1)
+    flow = np.sum((v - along[:, None] * axis) ** 2, axis=1) / _HOVER_M_S**2
+    # u^2 = sqrt(1 + flow^2/4) - flow/2, without the loss of digits in fast flight.
+    gone = 1.0 - 1.0 / np.sqrt(np.sqrt(1.0 + flow**2 / 4.0) + flow / 2.0)
+    gain, precision = _GAIN, _GAIN_U**-2
+    square = np.mean(log.rpm[on] ** 2, axis=1)
+    lift = np.zeros(0) if log.acceleration is None else log.acceleration[on, 2]
+    if lift.size >= 20 * BATCHES and np.all(lift > 0.0) and np.all(square > 0.0) and np.ptp(gone) > 0.0:
+        c, u = jackknifed(np.column_stack([gone, along, np.ones(lift.size)]), np.log(lift / square))
+        own = float(max(u[0], 1e-6) ** -2)
+        gain = (precision * gain + own * float(c[0])) / (precision + own)
+        precision += own
+    gone_mean = float(gone.mean())
+    half = float(np.hypot(weight.half, 1.96 * precision**-0.5 * gone_mean * weight.value))
+    return Constant(weight.value * (1.0 - gain * gone_mean), half, weight.unit)
 
 
 def _blocks(y: Array, of: Callable[[Array], np.floating], unit: str) -> Constant:
@@ -177,8 +208,9 @@ def _drive(log: FlightLog) -> Array:
 
 def _motor(log: FlightLog, on: NDArray[np.bool_], out: dict[str, Constant], unseen: list[str]) -> None:
     speeds = log.rpm is not None and log.sound
-    if speeds and log.command is not None and log.voltage is not None and log.command_unit == "1":
-        assert log.rpm is not None
+    measured = log.voltage is not None and np.ptp(log.voltage[on]) > 1e-9
+    if speeds and log.command is not None and measured and log.command_unit == "1":
+        assert log.rpm is not None and log.voltage is not None
         volts = (log.command[on] * log.voltage[on, None])[:, log.sound].mean(axis=1)
         k, half = _regress(np.column_stack([volts, np.ones(volts.size)]), log.rpm[on][:, log.sound].mean(axis=1))
         if half[0] < abs(k[0]):
@@ -186,6 +218,9 @@ def _motor(log: FlightLog, on: NDArray[np.bool_], out: dict[str, Constant], unse
             out["motor line, offset"] = Constant(float(k[1]), float(half[1]), "rpm")
     if log.voltage is None:
         unseen.append("battery: log its voltage")
+        return
+    if not measured:
+        unseen.append(f"battery: its voltage reads {log.voltage[on][0]:.3g} V throughout, so it was hardly measured")
         return
     out["battery voltage"] = _blocks(log.voltage[on], np.mean, "V")
     if log.battery_current is not None and np.std(log.battery_current[on]) > 0.0:

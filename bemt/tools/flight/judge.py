@@ -43,7 +43,7 @@ from bemt.tools.flight.balance import (
 )
 from bemt.tools.flight.change import FlightChange, FlightEvidence, FlightReadings
 
-__all__ = ["ELSEWHERE", "BesideBalance", "FlightVerdict", "judge", "posterior"]
+__all__ = ["ELSEWHERE", "BesideBalance", "FlightVerdict", "judge", "posterior", "total_sd"]
 
 ELSEWHERE = (DAY, BUILD, WIDE)
 """Explanations that say nothing of a fault: the healthy flights are of another day, or the vehicle is of its own."""
@@ -114,9 +114,11 @@ def judge(
     label = np.array(days if len(days) == n else [0] * n, dtype=int)
     sure = posterior(flight, calm, layout, windy, beside, label, day)
     change = flight - (calm.mean(axis=0) if n else flight.mean())
-    totals, half = calm.mean(axis=1), float("nan")
+    half = float("nan")
     if n > 1:
-        half = float(stats.t.ppf(0.975, n - 1) * totals.std(ddof=1) * np.sqrt(1.0 + 1.0 / n))
+        # What the healthy flights show, and no less than what flights of other vehicles differ by at one voltage.
+        own = float(stats.t.ppf(0.975, n - 1) * calm.mean(axis=1).std(ddof=1) * np.sqrt(1.0 + 1.0 / n))
+        half = max(own, float(stats.t.ppf(0.975, n - 1 + TOTAL_FREE)) * total_sd(calm))
     cause = beside.change.causes if beside.change is not None else ()
     out = FlightVerdict(
         sure.said, change - change.mean(), next_flight(sure.said, layout, n), sure.found, sure.P, sure.scatter,
@@ -132,9 +134,10 @@ def judge(
         return out
     bad, several = [], np.unique(label).size > 1
     for k, h in enumerate(calm):
-        # Of several sessions each is left out; of one, each flight.
+        # Of several sessions each is left out; of one, each flight, and its day is as open as that of this one.
         keep = label != label[k] if several else np.arange(n) != k
-        other = posterior(h, calm[keep], layout, days=label[keep], day=None if several else label[k]).said
+        left_out = None if several else "" if isinstance(day, str) else int(label[k])
+        other = posterior(h, calm[keep], layout, days=label[keep], day=left_out).said
         bad.append(any(beside.healthy[k : k + 1]) or other.verdict in (*CLAIMS, "unknown"))
     interval = stats.binomtest(sum(bad), len(bad)).proportion_ci(method="exact")
     return replace(out, accused=sum(bad), healthy=len(bad), rate95=(float(interval.low), float(interval.high)),
@@ -206,11 +209,15 @@ def _worlds(calm: Array, axes: Array, known: bool, days: Array, day: int | None 
 
 def _totals(w: _World, calm: Array) -> list[_World]:
     """The same where the total drive repeats as between flights, and where mass, battery or air are others."""
+    return [replace(w, log=w.log + float(np.log(share)), total=float(np.hypot(total_sd(calm), more)))
+            for share, more in ((1.0 - _LOADED, 0.0), (_LOADED, LOADED))]  # fmt: skip
+
+
+def total_sd(calm: Array) -> float:
+    """Standard deviation of the total drive of the next flight about the mean of the healthy ones, pooled [1]."""
     n, totals = len(calm), calm.mean(axis=1)
     square = (float(np.sum((totals - totals.mean()) ** 2)) + TOTAL_FREE * TOTAL**2) / (n - 1 + TOTAL_FREE)
-    square *= 1.0 + 1.0 / n
-    return [replace(w, log=w.log + float(np.log(share)), total=float(np.sqrt(square + more**2)))
-            for share, more in ((1.0 - _LOADED, 0.0), (_LOADED, LOADED))]  # fmt: skip
+    return float(np.sqrt(square * (1.0 + 1.0 / n)))
 
 
 def posterior(
@@ -342,9 +349,16 @@ def _said(said: Decision, P: Mapping[Explanation, float], given: int) -> Decisio
         why = "the shares moved as they do from one day to another; three healthy flights of the same day would tell"
         return replace(said, leading=elsewhere, why=why)
     if not given:
-        why = "no motor stands out by more than in healthy vehicles; give three or more healthy flights with --healthy"
+        return replace(said, why="no motor stands out by more than in healthy vehicles")
+    likely = sorted(P.items(), key=lambda kv: -kv[1])
+    first, share = likely[0][0], f"{100.0 * likely[0][1]:.0f} %"
+    if first == NONE:
+        return replace(said, why=f"most likely ({share}) flights merely differ so, but that is not sure enough")
+    if first == UNKNOWN:
+        why = f"the balance moved, most likely ({share}) as no listed cause moves it, but that is not sure enough"
         return replace(said, why=why)
-    return said
+    named = [f"{' and '.join(e)} ({100.0 * p:.0f} %)".replace(", motor ", " at motor ") for e, p in likely if e.ids]
+    return replace(said, why=f"several causes fit, none well enough: {', '.join(named[:3])}")
 
 
 def _claimed(said: Decision, faults: Sequence[str]) -> Decision:

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 
-__all__ = ["DENSE", "SPARSE", "FlightLog", "SpeedSensor", "Stretches", "joined", "thrust_axis"]
+__all__ = ["DENSE", "MOST", "SPARSE", "FlightLog", "SpeedSensor", "Stretches", "joined", "thrust_axis"]
 
 Source = tuple[Array, Array]
 T = TypeVar("T", bound=Sized)
 
 _ON, _LOW_M, _TRIM_S = 0.3, 0.15, 0.5  # share of the usual largest command; height; time after the start [m, s]
-_MOST = 200_000  # samples on the common time base; longer logs are thinned (an hour at 50 Hz is 180,000)
 _LARGEST = 1e9  # value above which a number is damage: no unit here comes near
+MOST = 200_000  # samples on the common time base; longer logs are thinned (an hour at 50 Hz is 180,000)
 DENSE, SPARSE = 1_000_000, 20  # samples of a fast sensor that are kept whole; of stretches beyond, every 20th
 
 
@@ -64,6 +64,7 @@ class FlightLog:
     raw_unit: str = "m/s2"
     # Unit of the commands; layout that the log states or the format usually has, may be empty
     command_unit: str = "1"
+    duty: float = 0.5  # Probability, by what was logged, that commands are shares of the battery's voltage [1]
     layout: str = ""
     # Half the sample interval of each quantity's source: how far a value may lie from its time [s]
     join_s: dict[str, float] = field(default_factory=dict)
@@ -133,15 +134,15 @@ class Stretches(Generic[T]):
     the slow motion is there throughout, and the fast one in stretches that spread over the log.
     """
 
-    def __init__(self, thin: Callable[[T], T]) -> None:
-        """Begin empty; `thin` takes every 20th sample of a stretch."""
-        self._thin, self.parts, self._whole = thin, cast(list[T], []), cast(list[bool], [])
+    def __init__(self, thin: Callable[[T], T], each: int = 1) -> None:
+        """Begin empty; `thin` takes every 20th sample of a stretch, whose rows hold `each` samples."""
+        self._thin, self._each, self.parts, self._whole = thin, each, cast(list[T], []), cast(list[bool], [])
 
     def add(self, part: T) -> None:
         """Keep a stretch."""
         self.parts.append(part)
         self._whole.append(True)
-        while sum(len(p) for p in self.parts) > DENSE and sum(self._whole) > 2:
+        while self._each * sum(len(p) for p in self.parts) > DENSE and sum(self._whole) > 2:
             for i in [k for k, whole in enumerate(self._whole) if whole][1::2]:
                 self.parts[i], self._whole[i] = self._thin(self.parts[i]), False
 
@@ -164,25 +165,22 @@ def joined(
     The times of `main` are kept; of more than 200,000 as many, evenly spread. `raw` keeps its own. InputError when
     fewer than 20 whole samples remain.
     """
-    clean = {}
-    for key, source in sources.items():
-        if source is None:
-            continue
-        t, v = np.asarray(source[0], dtype=float), np.asarray(source[1], dtype=float)
-        whole = _whole(t, v)
-        if whole[0].size > 1:
-            clean[key] = whole
-    if main not in clean or clean[main][0].size < 20:
+
+    def clean(source: Source | None) -> Source:
+        return (np.zeros(0), np.zeros(0)) if source is None else _whole(source[0], source[1])
+
+    t = clean(sources.get(main))[0]
+    if t.size < 20:
         raise InputError(Fault(file, main, "fewer than 20 whole samples", "a flight", "Log commands of the motors"))
-    t = clean[main][0]
-    if t.size > _MOST:
-        t = t[np.unique(np.searchsorted(t, np.linspace(t[0], t[-1], _MOST)))]
+    if t.size > MOST:
+        t = t[np.unique(np.searchsorted(t, np.linspace(t[0], t[-1], MOST)))]
     columns, halves = {}, {}
-    for key, (at, v) in clean.items():
-        flat = v.reshape(at.size, -1)
-        put = np.stack([np.interp(t, at, c) for c in flat.T], axis=1)
-        columns[key] = put[:, 0] if v.ndim == 1 else put
-        halves[key] = 0.0 if key == main else 0.5 * float(np.median(np.diff(at)))
+    for key, source in sources.items():
+        at, v = clean(source)  # one at a time: fast sources are most of the memory
+        if at.size > 1:
+            put = np.stack([np.interp(t, at, c) for c in v.reshape(at.size, -1).T], axis=1)
+            columns[key] = put[:, 0] if v.ndim == 1 else put
+            halves[key] = 0.0 if key == main else 0.5 * float(np.median(np.diff(at)))
     fast = None
     if raw is not None and raw[0].size > 1:
         at, v = _whole(raw[0], raw[1])
@@ -192,6 +190,7 @@ def joined(
 
 def _whole(t: Array, v: Array) -> Source:
     """Samples that can be, in order of time. A damaged clock jumps: back, or by hours; there the usable part ends."""
+    t, v = np.asarray(t, dtype=float), np.asarray(v, dtype=float)
     good = np.isfinite(t) & (np.abs(v.reshape(t.size, -1)) < _LARGEST).all(axis=1)  # not so of NaN
     t, v = t[good], v[good]
     jump = np.flatnonzero((np.diff(t) < -1.0) | (np.diff(t) > 3600.0))

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import mmap
 import re
 import struct
 from collections.abc import Callable
@@ -17,6 +18,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, needs
@@ -60,36 +62,54 @@ def read(path: Path) -> FlightLog:
 
 def _reduced(file: BinaryIO) -> io.BytesIO:
     """A log with the messages of the used topics alone, fast topics in stretches (ULog file format, PX4 user guide)."""
-    head, data = bytearray(file.read(16)), dict[int, Stretches[list[bytes]]]()
-    begun, each = dict[int, list[bytes]](), dict[int, int]()
-    while len(start := file.read(3)) == 3:
-        size, kind = struct.unpack("<Hc", start)
-        body = file.read(size)
-        if len(body) < size or kind not in b"BFIMPQADLSOCR":
-            break
-        if kind == b"A":
-            name = body[3:].decode("latin-1")
-            if name in _TOPICS:
-                number = struct.unpack_from("<H", body, 1)[0]
-                each[number] = 32 if name == "sensor_accel_fifo" else 1
-                # Single bursts are too short for a spectrum; of the others every 20th message stays.
-                step = SPARSE if each[number] == 1 else _STRETCH
-                data[number], begun[number] = Stretches(lambda part, step=step: part[::step]), []  # type: ignore[misc]
-                head += start + body
-        elif kind == b"D" and size > 2:
-            number = struct.unpack_from("<H", body)[0]
-            if number in begun:
-                # A message of a burst holds 32 samples, so it weighs as 32.
-                begun[number] += [start + body, *[b""] * (each[number] - 1)]
-                if len(begun[number]) >= _STRETCH:
-                    data[number].add(begun[number])
-                    begun[number] = []
-        elif kind == b"B":
-            head += start + bytes(size)  # without the places of appended data, which are other ones now
-        elif kind in b"FPQ":
-            head += start + body
-    parts = [m for number, kept in data.items() for p in (*kept.parts, begun[number]) for m in p]
-    return io.BytesIO(bytes(head) + b"".join(parts))
+    with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        head, topics, at, end = bytearray(data[:16]), dict[int, _Messages](), 16, len(data)
+        start = struct.Struct("<HcH").unpack_from  # size, kind and, of data, the number of the topic
+        while at + 5 <= end:
+            size, kind, number = start(data, at)
+            after = at + 3 + size
+            if after > end or kind not in b"BFIMPQADLSOCR":
+                break
+            if kind == b"D":
+                if number in topics and size > 2:
+                    topics[number].add(data[at:after])
+            elif kind == b"A":
+                name = data[at + 6 : after].decode("latin-1")
+                if name in _TOPICS:
+                    number = struct.unpack_from("<H", data, at + 4)[0]
+                    topics[number] = _Messages(32 if name == "sensor_accel_fifo" else 1)
+                    head += data[at:after]
+            elif kind == b"B":
+                # without the places of appended data, which are other ones now
+                head += data[at : at + 3] + bytes(size)
+            elif kind in b"FPQ":
+                head += data[at:after]
+            at = after
+    parts: list[bytes | bytearray | memoryview] = [head]
+    for messages in topics.values():
+        parts += [*(part.data for part in messages.kept.parts), messages.begun]
+    return io.BytesIO(b"".join(parts))
+
+
+class _Messages:
+    """Messages of one topic, in stretches; `each` of them holds so many samples."""
+
+    def __init__(self, each: int) -> None:
+        # Single bursts are too short for a spectrum; of the others every 20th message stays.
+        step = SPARSE if each == 1 else _STRETCH // each
+        self.kept = Stretches[NDArray[Any]](lambda part: part[::step].copy(), each)
+        self.begun, self.size, self._full = bytearray(), 0, _STRETCH // each
+
+    def add(self, message: bytes) -> None:
+        """Keep a message; all of a topic have one length, else it is damaged."""
+        if len(message) != self.size:
+            if self.size:
+                return
+            self.size = len(message)
+        self.begun += message
+        if len(self.begun) >= self._full * self.size:
+            self.kept.add(np.frombuffer(bytes(self.begun), dtype=f"V{self.size}"))
+            self.begun.clear()
 
 
 def _made(name: str, found: Any) -> FlightLog:

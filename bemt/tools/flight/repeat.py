@@ -1,9 +1,10 @@
 """How far a constant differs from flight to flight of one vehicle, beyond what the blocks of one flight show.
 
-Prior: thrust constants of four recorded flights of a brushed Crazyflie 2.1 of one mass have a standard deviation of
-0.7 % (three degrees of freedom) where the blocks of each flight say 0.1 to 0.3 %. What moves it is not known: battery,
-height over the floor, wear. Own flights are pooled with it (scaled inverse chi-squared; Gelman et al., Bayesian Data
-Analysis, 3rd ed., section 2.6).
+Prior: thrust constants of four recorded flights of a brushed Crazyflie 2.1 of one mass had a standard deviation of
+0.7 % (three degrees of freedom) where the blocks of each flight say 0.1 to 0.3 %. Without what air across the disks
+adds (:mod:`bemt.tools.flight.identify`) six of them have 0.45 %, eight of a brushless one 0.21 % and four with a
+payload 0.11 %; but the payload still weighs 2 % too little, so the prior stays. Own flights are pooled with it (scaled
+inverse chi-squared; Gelman et al., Bayesian Data Analysis, 3rd ed., section 2.6).
 """
 
 from __future__ import annotations

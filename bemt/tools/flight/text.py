@@ -40,8 +40,8 @@ def text(a: FlightAnswer, details: bool = False) -> str:
         lines.append(f"  Error rate: {j.accused} of {j.healthy} healthy flights accused when each is judged {by} "
                      f"(95 %: {100 * low:.0f} to {100 * high:.0f} %).")  # fmt: skip
     if j.given and j.sessions < 2:
-        lines.append("  The healthy flights are one session for all that is known: what changes from day to day "
-                     "(1.2 to 3.1 % of a rotor's drive, other vehicles) they do not show.")  # fmt: skip
+        lines.append("  The healthy flights count as one session: what changes from day to day (1.2 to 3.1 % of a "
+                     "rotor's drive, on other vehicles) they cannot show.")  # fmt: skip
     if np.isfinite(j.visible):
         against = "against these healthy flights" if j.given else "without healthy flights of this vehicle"
         lines.append(f"  A damaged rotor shows from a change of its drive by {100 * j.visible:.0f} %, {against}.")
@@ -88,8 +88,10 @@ def pilot(a: FlightAnswer) -> list[str]:
         second = [level]
     if not second and j.given and j.readings.size:
         order = sorted(range(j.readings.size), key=lambda k: -abs(float(j.readings[k])))[:2]
-        most = ", ".join(f"motor {k + 1} {100 * float(j.readings[k]):+.0f} %" for k in order)
-        second = [f"Largest changes of the drive against the healthy flights: {most}."]
+        most = ", ".join(f"motor {k + 1} {_signed(float(j.readings[k]))}" for k in order)
+        second = [f"Against the mean of all motors, drives changed most from the healthy flights at {most}."]
+    if not second and np.isfinite(j.visible):
+        second = [f"One flight alone shows damage once it changes a rotor's drive by {100 * j.visible:.0f} %."]
     if not second:
         second = [f"{headline(j)}: {j.said.why}."]
     return [_look(a), " ".join(second), f"Next: {j.next.text or 'nothing'}."]
@@ -106,7 +108,7 @@ def _look(a: FlightAnswer) -> str:
     """What is wrong, in a sentence of a mechanic."""
     j, said = a.judged, a.judged.said
     if said.verdict == "none" and j.total_moved:
-        return _together(j)
+        return _together(a)
     if said.verdict == "none":
         return "Nothing to look at: the motors share the work as in the healthy flights."
     if not said.effects:
@@ -147,12 +149,15 @@ def _blades(a: FlightAnswer, first: str, rest: Sequence[str]) -> str:
     return f"Look at motor {k}: it works {size}harder than {others}. {what[:1].upper()}{what[1:]} would do this."
 
 
-def _together(j: FlightVerdict) -> str:
+def _together(a: FlightAnswer) -> str:
     """All motors do more, or less, than in the healthy flights."""
+    j, m = a.judged, a.mass
     how = "harder" if j.total > 0.0 else "less"
+    why = "weight at the centre, battery, air, or damage that balances"
+    if m is not None:
+        why = f"with their propellers it weighs {_figures(1e3 * m.value, 3)} ± {_figures(1e3 * m.half, 2)} g"
     return f"All motors are driven {100 * abs(j.total):.0f} % {how} than in the healthy flights (they differ by " \
-           f"±{100 * j.total_half:.0f} %), and share the work as there: weight at the centre, battery, air, or " \
-           "damage that balances."  # fmt: skip
+           f"±{100 * j.total_half:.0f} %), and share the work as there: {why}."  # fmt: skip
 
 
 def _alternatives(names: Sequence[str]) -> str:
@@ -171,10 +176,14 @@ def _level(shake: Vibration) -> str:
     if not np.isfinite(shake.line) or shake.unit != "m/s2" or not shake.rms:
         return ""
     total = float(np.linalg.norm(shake.rms))
-    high = f"Vibration is high: {total:.2g} m/s2 above 20 Hz" if total > _HIGH else f"Vibration {total:.2g} m/s2"
     known = np.isfinite(shake.shaft_hz)
-    what = "once a turn" if known else "in the spectrum: likely once a turn; no speed was logged to know"
-    return f"{high}, strongest at {shake.line_hz:.0f} Hz ({what})."
+    what = "once a turn" if known else "likely once a turn; no speed was logged to know"
+    at = f"{shake.line_hz:.0f} Hz ({what})"
+    # The line is an amplitude, the others root mean squares.
+    most = shake.line**2 / 2.0 > 0.5 * total**2
+    where = f"most of it at {at}, as a rotor out of balance shakes" if most else f"strongest at {at}"
+    high = "high: " if total > _HIGH else ""
+    return f"Vibration {high}{total:.2g} m/s2 above 20 Hz, {where}."
 
 
 def _seen(a: FlightAnswer) -> list[str]:
@@ -185,17 +194,16 @@ def _seen(a: FlightAnswer) -> list[str]:
 
 def _drives(a: FlightAnswer) -> list[str]:
     """Drive of each motor, their balance, and what limits or falsifies it."""
-    lines, shares = [], a.found.rotors.get("mean command", a.found.rotors.get("share of rpm^2", ()))
-    if shares:
-        mean = sum(shares) / len(shares)
-        each = ", ".join(f"{i + 1}: {100 * (v / mean - 1.0):+.0f} %" for i, v in enumerate(shares))
+    lines = []
+    if a.drives:
+        each = ", ".join(f"{i + 1}: {_signed(v)}" for i, v in enumerate(a.drives))
         lines.append(f"Drive of each motor against their mean: {each}.")
     if len(a.balance) == 3:
         pairs = (("left", "right"), ("front", "rear"), ("left-turning", "right-turning"))
-        parts = [
-            f"{one if b > 0 else two} by {100 * abs(b):.0f} %" for (one, two), b in zip(pairs, a.balance, strict=True)
-        ]
-        lines.append(f"Driven harder: {', '.join(parts)} (centre of mass; trim in yaw).")
+        parts = [f"{one if b > 0 else two} by {100 * abs(b):.0f} %"
+                 for (one, two), b in zip(pairs, a.balance, strict=True) if abs(b) >= 0.005]  # fmt: skip
+        more = f"Driven harder: {', '.join(parts)} (centre of mass; trim in yaw)."
+        lines.append(more if parts else "Left and right, front and rear, and both ways of turning are driven alike.")
     full = [f"motor {i + 1} {100 * v:.1f} %" for i, v in enumerate(a.limited) if v > _OFTEN]
     if full:
         lines.append(f"At full command: {', '.join(full)} of the time.")
@@ -252,7 +260,7 @@ def _heard(a: FlightAnswer) -> list[str]:
         return []
     seen = f"found in the spectrum: once a turn at {60 * shake.line_hz:.0f} rev/min, if so"
     where = "once a turn" if known else seen
-    lines = [f"Strongest vibration: {shake.line:.2g} {shake.unit} at {shake.line_hz:.0f} Hz ({where})."]
+    lines = [f"Strongest vibration: amplitude {shake.line:.2g} {shake.unit} at {shake.line_hz:.0f} Hz ({where})."]
     return lines + ([f"At twice that: {shake.twice:.2g} {shake.unit}."] if np.isfinite(shake.twice) else [])
 
 
@@ -262,7 +270,8 @@ def _along_axes(a: FlightAnswer) -> list[str]:
     if not shake.rms or not np.isfinite(shake.rms[0]):
         return []
     said = "as the autopilot states it (VIBE)" if shake.stated else "above 20 Hz"
-    return [f"Vibration {said}: {', '.join(f'{v:.2g}' for v in shake.rms)} {shake.unit} in x, y, z."]
+    each = ", ".join(f"{v:.2g}" for v in shake.rms)
+    return [f"Vibration {said}: {each} {shake.unit} in x, y, z (root mean square)."]
 
 
 def _blown(a: FlightAnswer) -> list[str]:
@@ -270,8 +279,9 @@ def _blown(a: FlightAnswer) -> list[str]:
     w = a.wind
     if not np.isfinite(w.speed):
         return []
-    seen = "Wind" if w.speed > w.half else "No wind seen:"
-    return [f"{seen} {w.speed:.1f} ± {w.half:.1f} m/s towards {w.heading_deg:.0f} deg from x."]
+    if w.speed < w.half:
+        return [f"No wind seen: {w.speed:.1f} ± {w.half:.1f} m/s."]
+    return [f"Wind {w.speed:.1f} ± {w.half:.1f} m/s, towards {w.heading_deg:.0f} deg to the left of the log's x axis."]
 
 
 def _flow(a: FlightAnswer) -> list[str]:
@@ -312,6 +322,12 @@ def sensor_text(s: SpeedSensor) -> str:
     if s.lost > _OFTEN:
         parts.append(f"drops out in {100 * s.lost:.0f} % of the flight")
     return f"The speed sensor of motor {s.motor} {' and '.join(parts)}"
+
+
+def _signed(part: float) -> str:
+    """A change in per cent, without the sign of nothing."""
+    whole = round(100 * part)
+    return f"{whole:+d} %" if whole else "0 %"
 
 
 def _number(c: Constant) -> str:
