@@ -133,12 +133,22 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
     """Weigh all explanations."""
     bank = _Bank.of(problem, candidates)
     rivals = noise.rivals(problem, _told(candidates))
-    leading = _leading(bank)
-    states = [_state(bank, h, rivals, pairs) for h in leading]
-    if rivals:
-        best = max(states, key=lambda s: s.log_z[UNKNOWN] + np.log(s.hyper.weight)).best_rival
-        h = _of_rival(problem, next(k for k in rivals if k.name == best))
-        states += [] if h in leading else [_state(bank, h, rivals, pairs)]
+    states = []
+    for h in _leading(bank):
+        C = noise.covariance(problem, h)
+        state = _single(bank, h, conditional(C, problem.u, problem.changed))
+        beside = noise.unlike(C, problem.u, rivals)
+        gains = unknown(beside, problem.residual)
+        state.log_z[UNKNOWN] = state.log_z[NONE]
+        if gains.size:
+            state.best_rival = rivals[int(np.argmax(gains))].name
+            counts = _noticed(problem, rivals, beside)
+            for where, some in ((state.log_z, counts), (state.small, ~counts)):
+                share = float(log_sum(gains[some])) - float(np.log(gains.size)) if some.any() else _SHUT
+                where[UNKNOWN] = state.log_z[NONE] + share
+        if pairs:
+            _pairs(bank, state)
+        states.append(state)
     before = knowledge.log_priors(knowledge.prior_weights(problem, list(bank.spans)), pairs, knowledge.kinds(problem))
     rough = {c.id for c in candidates if problem.by_laws and effects.catalogue()[c.id].kind != "stand"
              and not effects.catalogue()[c.id].exact}  # fmt: skip
@@ -146,37 +156,6 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
     likeliest = max(probability, key=lambda k: probability[k])
     states.sort(key=lambda s: -(s.log_z[likeliest] + np.log(s.hyper.weight)))
     return Evidence(problem, tuple(candidates), tuple(states), probability, bank.spans, bank.log_w, rivals)
-
-
-def _state(bank: _Bank, h: Hyper, rivals: Sequence[SmoothAlternative], pairs: bool) -> State:
-    """Evidence of every explanation under one covariance."""
-    problem = bank.problem
-    C = noise.covariance(problem, h)
-    state = _single(bank, h, conditional(C, problem.u, problem.changed))
-    beside = noise.unlike(C, problem.u, rivals)
-    gains = unknown(beside, problem.residual)
-    state.log_z[UNKNOWN] = state.log_z[NONE]
-    if gains.size:
-        state.best_rival = rivals[int(np.argmax(gains))].name
-        counts = _noticed(problem, rivals, beside)
-        for where, some in ((state.log_z, counts), (state.small, ~counts)):
-            share = float(log_sum(gains[some])) - float(np.log(gains.size)) if some.any() else _SHUT
-            where[UNKNOWN] = state.log_z[NONE] + share
-    if pairs:
-        _pairs(bank, state)
-    return state
-
-
-def _of_rival(problem: Problem, rival: SmoothAlternative) -> Hyper:
-    """Setting of the covariance under which something unknown is best, the likeliest being ``rival``."""
-    scores = []
-    for h, C in noise.covariances(problem):
-        white = conditional(C, problem.u, problem.changed)
-        r = white(problem.residual)
-        none = -0.5 * float(r @ r) - white.log_det - float(white.misfit(problem.residual))
-        gain = float(unknown(noise.unlike(C, problem.u, (rival,)), problem.residual)[0])
-        scores.append((none + gain + float(np.log(h.weight)), h))
-    return max(scores, key=lambda found: found[0])[1]
 
 
 def log_odds(problem: Problem, candidates: Sequence[Candidate]) -> dict[str, float]:
