@@ -163,7 +163,7 @@ def test_a_short_log_of_step_responses_keeps_its_transients(tmp_path: Path, rows
     assert n > 0.9 * rows if kept else n < 0.1 * rows
 
 
-@pytest.mark.xfail(strict=True, reason="insufficient: the lag is not likely enough for something unknown")
+@pytest.mark.xfail(strict=True, reason="two drifts: a covariance that suits the unknown costs real densities")
 def test_a_balance_that_stays_behind_is_nothing_in_the_library() -> None:
     up = points("static")
     there_and_back = np.r_[np.arange(17), np.arange(16, -1, -1)]
