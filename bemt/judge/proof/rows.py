@@ -235,8 +235,8 @@ class Proof(Documented):
     score: tuple[ScoreRow, ...]
     baselines: tuple[ScoreRow, ...]
     strata: tuple[Stratum, ...]
-    reliability: tuple[Reliability, ...]
     confusion: Mapping[str, Mapping[str, int]]
+    reliability: tuple[Reliability, ...] = ()
     answers: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     misses: tuple[Miss, ...] = ()
     seconds_median: float = math.nan
