@@ -43,7 +43,7 @@ SPORT_DEG = 0.97
 """Further zero-lift angle of sport propellers from the same fit, +- 0.26 [deg]."""
 BLADES_DRAG = (0.23, 0.13)
 """The same of three and more blades: 40 of Drive Calculator's and 7 of UIUC, eight makers alike in weight (0.16 to 0.30
-with one left out). The same blade on two, three and four arms differs by 0.04 (each fit +- 0.2): it is the blades on sale [1]."""
+with one left out). The same blade on two, three and four arms differs by 0.04 (each fit +- 0.2): blades on sale [1]."""
 DEG_PER_CAMBER = 104.0
 """Zero-lift angle over camber of a NACA four-digit mean line, camber at 40 % chord: thin-airfoil theory [deg]."""
 _CHORD_LAW = (0.05, 1.0)  # chords over the radius that a propeller may have
