@@ -6,7 +6,7 @@ Axial coordinate x runs downstream from the leading edge of the lip.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -74,7 +74,7 @@ class Duct:
     te_thickness: float | None = None
     # Radius of the outer wall at its widest, behind a nose round as a quarter circle; None is a lip as thick outside as
     # inside [m]
-    outer_radius: float | None = None
+    outer_radius: float | None = field(default=None, repr=False)
     name: str = ""  # For people
 
     def __post_init__(self) -> None:
@@ -134,6 +134,10 @@ class Duct:
     def lip_length(self) -> float:
         """Axial length of the lip [m]."""
         return self.lip_aspect * self.lip_radius
+
+    def key(self) -> str:
+        """Text that tells this shape from others; an outer wall that is not stated is no part of it."""
+        return f"{self!r}{'' if self.outer_radius is None else f' outer_radius={self.outer_radius!r}'}"
 
     @property
     def nose(self) -> tuple[float, float]:

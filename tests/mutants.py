@@ -77,7 +77,7 @@ MUTANTS = (
            "test_kernel_guards.py -k oblique"),
     # duct
     Mutant(DUCT, "bend = np.where(V > 0.0, self.bend * V / np.hypot(y, V), 0.0)", "bend = 0.0 * y", GUARDS),
-    Mutant(DUCT, "T = jet - mdot * V - 0.5 * rho", "T = jet - 0.5 * rho", FAN),
+    Mutant(DUCT, "T = jet - mdot * V - rho", "T = jet - rho", FAN),
     Mutant(DUCT, "wall_loss=wall_friction * 4.0 *", "wall_loss=wall_friction * 2.0 *", "test_kernel_guards.py -k duct"),
     Mutant(DUCT, "tip2 = (0.5 * (self.area / (math.pi * self.span) + self.span)) ** 2",
            "tip2 = (0.5 * (self.area / (math.pi * self.span) - self.span)) ** 2", FAN),

@@ -102,7 +102,8 @@ def point_key(point: CampaignPoint) -> tuple[str, str, Settings]:
     """
     settings, parts = settings_of(point.case, point.run)
     files = case_files(settings) | {"system/controlDict": control(settings, balance=False)}
-    shape = f"{parts.rotor.key()}|{parts.duct!r}|{None if parts.tail is None else parts.tail.round(9).tolist()}"
+    wall = None if parts.duct is None else parts.duct.key()
+    shape = f"{parts.rotor.key()}|{wall}|{None if parts.tail is None else parts.tail.round(9).tolist()}"
     body = [f"{name}\n{text}" for name, text in sorted(files.items()) if name != "Allrun"]
     grid = _digest(shape, *(files[name] for name in GRID_FILES))
     return _digest(shape, *body, str(settings.average), str(point.warm))[:12], grid[:12], settings
