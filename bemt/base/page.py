@@ -41,7 +41,7 @@ def num(value: Any, digits: int = 4, signed: bool = False, none: str = "-") -> C
 
 
 @dataclass(frozen=True)
-class Table:
+class PageTable:
     """A table."""
 
     head: list[tuple[str, bool]]  # Words of a column, and whether it is of numbers
@@ -49,14 +49,14 @@ class Table:
     sort: bool  # Whether a reader may sort it
 
 
-def table(head: Sequence[str], rows: Iterable[Sequence[object]], sort: bool = True) -> Table | None:
+def table(head: Sequence[str], rows: Iterable[Sequence[object]], sort: bool = True) -> PageTable | None:
     """Make a table; None without rows."""
     body = [[cell if isinstance(cell, Cell) else Cell(str(cell)) for cell in row] for row in rows]
     if not body:
         return None
     units = [re.sub(r"\[[^]]*\]", lambda unit: unit[0].replace(" ", "\u00a0"), words) for words in head]
     numbers = [any(row[k].number for row in body) for k in range(len(head))]
-    return Table(list(zip(units, numbers, strict=True)), body, sort)
+    return PageTable(list(zip(units, numbers, strict=True)), body, sort)
 
 
 def _clean(value: Any) -> Any:

@@ -382,10 +382,8 @@ def merged(parts: Sequence[Dataset]) -> list[Dataset]:
 
 CELL_SIZE = re.compile(r"((cell|mesh|grid|element|base)[_ ]?(size|spacing)|dx|h)(_m)?", re.IGNORECASE)
 """Columns of a size of cells in a table of grids."""
-HEIGHT, LOWEST = re.compile(r"h(_m)?", re.IGNORECASE), 0.01
-"""Of these, one that may be a height over ground as well, and a height at which no rotor turns [m]."""
-OF_CFD = re.compile(r"grid|mesh|solver|turbulence|y_?plus|cfd", re.IGNORECASE)
-"""Other columns by which a table is one of CFD."""
+HEIGHT = re.compile(r"h(_m)?", re.IGNORECASE)
+"""Of these, one that in somebody's table may be a height over ground as well."""
 
 
 def of_table(record: Dataset) -> Dataset:
@@ -404,10 +402,9 @@ def of_table(record: Dataset) -> Dataset:
     if np.unique(cells[np.isfinite(cells)]).size < 2 or any(np.isfinite(d.u[k]).any() for k in loads):
         return record
     unit = "m" if column.endswith("_m") else ""
-    low = bool(unit) and np.nanmax(cells) < LOWEST
-    if HEIGHT.fullmatch(column) and not low and not any(OF_CFD.search(k) for k in (*record.texts, *record.values)):
-        note = f"{column}: a height, or the size of cells? A grid study takes it from a column headed cell_size, or "
-        return replace(record, notes=(*record.notes, f"{note}beside one that names the grid"))
+    if HEIGHT.fullmatch(column):
+        note = f"{column}: a height, or the size of cells? A grid study takes it from a column headed cell_size"
+        return replace(record, notes=(*record.notes, note))
     told = {k.lower(): v[0] for k, v in record.texts.items() if k.lower() in CONDITIONS and len({*v}) == 1}
     values = {k: v for k, v in d.values.items() if k in (*LOADS, *_SAME)}
     made = CfdRun("cfd", record.name, values, provenance={**record.provenance, "format": "cfd_run"},

@@ -67,12 +67,12 @@ def conditions(
 
 
 def projected_out(
-    label: NDArray[np.intp], size: Array, model: Array, full: Array, run: Array, place: Array, fell: Array
+    label: NDArray[np.intp], size: Array, model: Array, full: Array, run: Array, place: Array, falling: Array
 ) -> Array:  # fmt: skip
     """Columns of what repeats may differ by besides noise, (N, k).
 
-    Conditions; gain, zero and drift of each run; and what stays behind where the load ``fell``, since repeatability is
-    that of readings under rising load (ISO 376:2011, reversibility is apart; not checked).
+    Conditions; gain, zero and drift of each run; and what stays behind where the load is ``falling``, since
+    repeatability is that of readings under rising load (ISO 376:2011, reversibility is apart; not checked).
     """
     columns = [np.where(label == g, size, 0.0) for g in np.unique(label)]
     for r in np.unique(run):
@@ -80,7 +80,7 @@ def projected_out(
         late = (place - place[mine].mean()) / max(float(np.ptp(place[mine])), 1e-12)
         columns += [np.where(mine, shape, 0.0) for shape in (model, full, full * late)]
     share = model / np.where(full > 0.0, full, 1.0)
-    columns += [fell * full * share**k for k in range(_TERMS)]
+    columns += [falling * full * share**k for k in range(_TERMS)]
     return np.stack(columns, axis=1)
 
 

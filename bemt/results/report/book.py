@@ -26,7 +26,7 @@ Section = tuple[str, list[Part]]
 
 
 @dataclass(frozen=True)
-class Block:
+class Beside:
     """Parts beside a figure."""
 
     parts: list[Part]

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from bemt.base.page import Cell, Table, num, table
+from bemt.base.page import Cell, PageTable, num, table
 from bemt.base.tables import number_text
 from bemt.physics import coefficients as co
-from bemt.results.report.book import Block, CasePage, Reproduced, Section, sections, uri
+from bemt.results.report.book import Beside, CasePage, Reproduced, Section, sections, uri
 from bemt.results.report.diagnosis_block import (
     audit_parts,
     diagnosis_parts,
@@ -219,7 +219,7 @@ def _verification(page: CasePage) -> Section:
     if study and study.flags:
         words.append("Remarks: " + "; ".join(study.flags) + ".")
     found = table(["elements", "thrust [N]", "torque [N m]"], rows) if plot else None
-    side = Block([("table", found), ("words", " ".join(words))]) if plot or words else None
+    side = Beside([("table", found), ("words", " ".join(words))]) if plot or words else None
     return "Verification", [("figures", [plot, side])]
 
 
@@ -249,7 +249,7 @@ def _quantity(c: Comparison) -> str:
     return f"{name.replace('_', ' ')} [{c.unit}]"
 
 
-def reproduction_table(items: Sequence[Reproduced]) -> Table | None:
+def reproduction_table(items: Sequence[Reproduced]) -> PageTable | None:
     """Make the table of numbers of the thesis beside ours."""
     rows = []
     for item in items:

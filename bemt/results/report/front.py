@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-from bemt.base.page import Cell, Table, num, table
+from bemt.base.page import Cell, PageTable, num, table
 from bemt.base.tables import number_text
 from bemt.results.report.book import Book, CasePage, Part, ShownAnswer, uri
 from bemt.results.report.diagnosis_block import (
@@ -92,7 +92,7 @@ COLUMNS = ("case", "rev/min", "tip Mach", "BEMT [N]", "u [N]", "BEMT torque [N m
            "own CFD [N]", "bench [N]", "vendor [N]", "BEMT − CFD [%]", "K1/K2 − CFD [%]", "agreement")  # fmt: skip
 
 
-def _comparison_table(book: Book, ids: Sequence[str]) -> Table | None:
+def _comparison_table(book: Book, ids: Sequence[str]) -> PageTable | None:
     rows = []
     for page, key in zip(book.cases, ids, strict=True):
         kind, word, _ = page_verdict(page)

@@ -155,9 +155,10 @@ def _of_label(
         "M_tip": points.M_tip, "Re75": points.Re75, "k1k2_thrust_N": simple.thrust_N,
         "H_force_N": points.values.get("H_force_N", np.where(points.converged, 0.0, np.nan)),
     }  # fmt: skip
-    given = Given(label, told.diameter_in, told.pitch_in, told.blades, told.blade_class, chord_mm, measured_pitch_in,
-                  case.file.blade.family, float(case.air().rho), reading, case.as_built().prior.known_from,
-                  measured_source(case))  # fmt: skip
+    given = EstimateInput(
+        label, told.diameter_in, told.pitch_in, told.blades, told.blade_class, chord_mm, measured_pitch_in,
+        case.file.blade.family, float(case.air().rho), reading, case.as_built().prior.known_from, measured_source(case),
+    )  # fmt: skip
     u = {"thrust_N": columns["u_thrust_N"], "power_W": columns["u_power_W"]}
     values = {k: v for k, v in columns.items() if k.startswith("u_reading") or not k.startswith(("u_", "u95_"))}
     if (sideslip := np.radians(values.pop("angle_deg"))).any():
@@ -178,7 +179,7 @@ def _label(label: str, blades: int | None) -> tuple[Designation | None, list[Fau
         return None, list(error.faults)
 
 
-class Given(Documented):
+class EstimateInput(Documented):
     """What an estimate was asked for, and what its label says; ``class`` in the document is `blade_class`."""
 
     label: str
@@ -206,7 +207,7 @@ class RotorEstimate(Dataset):
     for narrower bands give --chord-mm (at 0.75 R) or --reading rpm=...,thrust_g=...
     """
 
-    given: Given
+    given: EstimateInput
     columns: Mapping[str, Array] = field(default_factory=dict)
 
     @property

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from bemt.base.document import Documented
-from bemt.base.page import Table, num, table
+from bemt.base.page import PageTable, num, table
 from bemt.data.readers import number
 from bemt.data.recordings.audit import Audit, CfdFacts
 from bemt.results.report.book import Book, CasePage, Page, Section, picture, sections
@@ -285,7 +285,7 @@ def fidelities(out: Path, cases: Sequence[str]) -> Fidelities:
 
 
 def fidelity_sections(found: Fidelities) -> list[Section]:
-    """Table of loads, and the axial speed at two distances behind."""
+    """PageTable of loads, and the axial speed at two distances behind."""
     rows = [[row["source"], num(value(row.get("J")), 2), num(value(row.get("thrust_N")), 4),
              num(value(row.get("torque_Nm")), 3), num(value(row.get("seconds")), 2), row.get("what", "")]
             for row in found.loads]  # fmt: skip
@@ -354,7 +354,7 @@ def _plots(item: Runs) -> list[Figure | None]:
     return plots
 
 
-def _runs(item: Runs) -> Table | None:
+def _runs(item: Runs) -> PageTable | None:
     def told(key: str) -> bool:
         values = [getattr(r, key) for r in item.runs]
         return any(math.isfinite(v) and (v != 0 or key in ("J", "airspeed_m_s")) for v in values)

@@ -26,7 +26,7 @@ from geometry.export import MANIFEST, SCHEMA
 from geometry.mesh import Options
 
 
-class Surface(Documented):
+class SolidPart(Documented):
     """Named part of a solid."""
 
     name: str
@@ -40,7 +40,7 @@ class Listed(Documented):
     format: str = ""
     unit: str = ""
     bytes: int = 0
-    surfaces: tuple[Surface, ...] = ()
+    surfaces: tuple[SolidPart, ...] = ()
 
 
 class ShownBand(Documented):
@@ -90,7 +90,7 @@ class Checks(Documented):
     min_section_thickness: float = math.nan
 
 
-class Told(Documented):
+class ManifestContents(Documented):
     """What a manifest says, of it what is read again; `parts` has the files of formats that list their own."""
 
     schema: str = ""
@@ -120,9 +120,9 @@ class Told(Documented):
         return files | {path: digest for part in self.parts.values() for path, digest in part.items()}
 
 
-def _told(manifest: Mapping[str, Any]) -> Told:
+def _told(manifest: Mapping[str, Any]) -> ManifestContents:
     own = {key: v["files"] for key, v in manifest.items() if isinstance(v, dict) and isinstance(v.get("files"), dict)}
-    return Told.from_document({**manifest, "parts": own})
+    return ManifestContents.from_document({**manifest, "parts": own})
 
 
 class PartlyRefused(InputError):
@@ -172,7 +172,7 @@ def export_case(job: Job, out: Path, formats: Sequence[str], progress: Callable[
     return manifest
 
 
-def _kept(before: Manifest, old: Told, gone: set[str], out: Path) -> Manifest:
+def _kept(before: Manifest, old: ManifestContents, gone: set[str], out: Path) -> Manifest:
     """What stays of the manifest before: formats that were not asked for again and whose files are as they were."""
 
     def there(files: Mapping[str, str], folder: str = "") -> bool:
@@ -193,14 +193,14 @@ def _kept(before: Manifest, old: Told, gone: set[str], out: Path) -> Manifest:
     return kept | ({"targets": targets} if targets else {})
 
 
-def _manifest(out: Path) -> tuple[Manifest, Told]:
+def _manifest(out: Path) -> tuple[Manifest, ManifestContents]:
     """Manifest of the export that is in a folder; empty when it is not one of ours."""
     try:
         manifest = json.loads((out / MANIFEST).read_text(encoding="utf-8"))
         told = _told(manifest)
-        return (manifest, told) if told.schema == SCHEMA else ({}, Told())
+        return (manifest, told) if told.schema == SCHEMA else ({}, ManifestContents())
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        return {}, Told()
+        return {}, ManifestContents()
 
 
 def _unchanged(out: Path, name: str, digest: str) -> bool:
@@ -340,7 +340,7 @@ def _errors_text(error: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def _targets_text(told: Told, out: Path) -> list[str]:
+def _targets_text(told: ManifestContents, out: Path) -> list[str]:
     """What each target holds, and how well."""
     lines = []
     for one in told.targets:

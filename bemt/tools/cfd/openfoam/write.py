@@ -340,7 +340,7 @@ def _notes(s: Settings, mach: float, left_out: bool) -> list[str]:
 
 
 @dataclass(frozen=True, eq=False)
-class Parts:
+class RunShapes:
     """Shapes of a run, the outline of the centre body behind the rotor, and what a reader has to know."""
 
     rotor: Rotor
@@ -350,7 +350,7 @@ class Parts:
     model: MeshModel
 
 
-def settings_of(case: Case, run: Run, options: Options | None = None) -> tuple[Settings, Parts]:
+def settings_of(case: Case, run: Run, options: Options | None = None) -> tuple[Settings, RunShapes]:
     """Work out the settings of a run."""
     file = case.path.as_posix()
     faults = check_run(run, file=file)
@@ -390,7 +390,7 @@ def settings_of(case: Case, run: Run, options: Options | None = None) -> tuple[S
         )  # fmt: skip
     except InputError as error:
         raise InputError([replace(fault, file=fault.file or file) for fault in error.faults]) from error
-    return settings, Parts(rotor, duct, tail, _notes(settings, mach, left_out), model)
+    return settings, RunShapes(rotor, duct, tail, _notes(settings, mach, left_out), model)
 
 
 def write_openfoam(case: Case, out: Path, run: Run, options: Options | None = None) -> dict[str, Any]:
