@@ -411,7 +411,7 @@ _HEADER = ["metric", "count", "value", "95 % (Wilson)", "target", "met"]
 def _tables(found: Proof) -> list[tuple[str, list[str], list[list[str]]]]:
     strata = [[f"above {s.low:g}" if math.isnan(s.high) else f"{s.low:g} to {s.high:g}", str(s.n),
                str(s.top1), str(s.claims), str(s.right)] for s in found.strata]  # fmt: skip
-    reliable = [["yes" if r.reference else "no", f"{r.low:g} to {r.high:g}", str(r.n), f"{r.stated:.3f}",
+    reliable = [["with" if r.reference else "without", f"{r.low:g} to {r.high:g}", str(r.n), f"{r.stated:.3f}",
                  f"{r.there / r.n:.3f}", " to ".join(f"{v:.2f}" for v in wilson(r.there, r.n))]
                 for r in found.reliability]  # fmt: skip
     confusion = [[there, ", ".join(f"{said} {n}" for said, n in sorted(row.items(), key=lambda kv: -kv[1]))]
