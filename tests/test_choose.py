@@ -269,3 +269,14 @@ def test_three_blades_of_a_racer_need_more_power_than_two() -> None:
     """As on the RS2205S, 4.5 to 8.6 % more: what is on sale with three blades has more drag than the drawing."""
     table = choose(3.0, 4, labels=["5x4", "5x4x3"], kv=2600.0).set_index("label")
     assert table.power_W["5x4x3"] > table.power_W["5x4"]
+
+
+def test_an_answer_says_what_stands_in_the_way(capsys: pytest.CaptureFixture[str]) -> None:
+    label = ["--labels", "17x6", "--rotors", "4", "--mass-kg", "1.2", "--cells", "4"]
+    assert main(["choose", *label, "--capacity-Ah", "5", "--minutes", "33"]) == 1
+    first = capsys.readouterr().out.splitlines()[0]
+    assert "nearest is 17x6" in first and "time" in first
+    assert main(["choose", *label, "--kv", "80", "200"]) == 1
+    assert "200 is the largest K_v that was tried" in capsys.readouterr().out
+    assert main(["choose", "--mass-kg", "0.03", "--rotors", "4", "--cells", "1", "--max-diameter-in", "1.6"]) == 2
+    assert "diameter" in capsys.readouterr().err  # not the thrust, which a small rotor makes

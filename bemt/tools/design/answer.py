@@ -82,7 +82,7 @@ def text(table: pd.DataFrame) -> str:
     fluid = "" if t.fluid == "air" else ", in water"
     pair = ", each one of a coaxial pair" if t.coaxial else ""
     what = f"{t.thrust_N:.3g} N" if t.mass_kg is None or t.fixed else f"{t.mass_kg:.3g} kg on {t.rotors} rotors"
-    lines = [*_headline(table, good, at)]
+    lines = [*_headline(table, good, at), *_at_an_end(table)]
     lines += [
         "",
         f"{what}{pair} on {t.cells}S at 50% charge{size}{fluid}, tip Mach up to {t.max_tip_mach:g}: "
@@ -138,6 +138,9 @@ def _columns(rows: list[list[str]]) -> list[str]:
 def _headline(table: pd.DataFrame, good: int, at: str) -> list[str]:
     """What to take, and what the least power would be; else the nearest."""
     first, t = table.iloc[0], table.attrs["target"]
+    if not good and first.probability > 0.0:
+        return [f"none meets it with a probability of {table.attrs['sure']:.0%}; nearest is {first.label} with "
+                f"{first.kv:.0f} rev/min/V at {first.probability:.0%} ({first.why})"]  # fmt: skip
     if not good:
         reach = table.loc[table.full_thrust_N.idxmax()]
         most = f"{reach.full_thrust_N:.3g} N, with {reach.label} at {reach.kv:.0f} rev/min/V"
@@ -157,6 +160,15 @@ def _headline(table: pd.DataFrame, good: int, at: str) -> list[str]:
             + ("" if t.rest_kg is None else f", {other.propulsion_g - first.propulsion_g:+.0f} g a rotor")
         )
     return lines
+
+
+def _at_an_end(table: pd.DataFrame) -> list[str]:
+    """Word of a first motor beyond which none was tried."""
+    kv = float(table.kv.iloc[0])
+    for end, word in ((table.kv.max(), "largest"), (table.kv.min(), "smallest")):
+        if table.attrs["target"].sized and table.kv.nunique() > 1 and kv == end:
+            return [f"{kv:.0f} is the {word} K_v that was tried: --kv LOW HIGH tries others"]
+    return []
 
 
 def document(table: pd.DataFrame) -> dict[str, Any]:

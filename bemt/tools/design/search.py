@@ -298,13 +298,15 @@ def _area(diameter_in: float) -> float:
 
 def _no_size(target: Target, small: Sequence[float]) -> Fault:
     """The thrust that no standard size carries, and what those that have room do."""
-    least, most = LOADING["fan" if target.fan else target.fluid]
-    ends = (small or target.sizes_in)[0], (small or target.sizes_in[:1])[-1]
-    low, high = least * _area(ends[0]), most * _area(ends[1])
-    within = "" if target.max_diameter_in is None else f" within {target.max_diameter_in:.3g} in"
-    what = "fans" if target.fan else "standard sizes"
-    expected = f"{low:.2g} to {high:.3g} N, the load of {what} from {ends[0]:.3g} to {ends[1]:.3g} in"
+    what = "fan" if target.fan else "standard size"
     hint = "Or more rotors" if target.fan else "Other sizes: name them with --labels"
+    if not small:
+        expected = f"{target.sizes_in[0]:.3g} in or more, the smallest {what}"
+        return Fault("", "the largest diameter", f"{target.max_diameter_in:.3g} in", expected, hint)
+    least, most = LOADING["fan" if target.fan else target.fluid]
+    low, high = least * _area(small[0]), most * _area(small[-1])
+    within = "" if target.max_diameter_in is None else f" within {target.max_diameter_in:.3g} in"
+    expected = f"{low:.2g} to {high:.3g} N, the load of a {what} from {small[0]:.3g} to {small[-1]:.3g} in"
     return Fault("", "--thrust-N", f"{target.thrust_N:g} N{within}", expected, hint)
 
 
@@ -429,6 +431,7 @@ def _rows(loads: RotorLoads, u: LoadScatter, machines: Sequence[KnownMotor], tar
     _, amps, power = chain.at(n_at, torque * loads.torque_at(n_at))
     mach = np.broadcast_to(loads.tip_mach(n_full, target.airspeed_m_s), duty.shape)
     met = np.isfinite(duty) & (mach <= target.max_tip_mach)
+    reached = met[:, 1:].mean(axis=1)
     minutes = 60.0 * (1.0 - SOC_END) * (target.capacity_Ah or 1.0) / target.rotors / amps
     if target.minutes is not None:
         met &= minutes >= target.minutes
@@ -439,7 +442,7 @@ def _rows(loads: RotorLoads, u: LoadScatter, machines: Sequence[KnownMotor], tar
     at, asked, n_at = (np.broadcast_to(v, power.shape)[:, 0] for v in (at, asked, n_at))
     return [
         {"label": loads.label, "diameter_in": loads.diameter_m / INCH, "motor": m.name, "kv": m.kv,
-         "probability": float(chance[i]), "power_W": float(power[i, 0]), "u_power_W": scatter[i],
+         "probability": float(chance[i]), "reached": float(reached[i]), "power_W": float(power[i, 0]), "u_power_W": scatter[i],
          "current_A": float(amps[i, 0]), "peak_A": float(peak[i]),
          "g_per_W": 1e3 * float(at[i]) / G0 / float(power[i, 0]), "minutes": float(minutes[i, 0]),
          "rpm": float(n_at[i]),
@@ -487,8 +490,11 @@ def _reasons(table: pd.DataFrame, target: Target, sure: float) -> list[str]:
             words.append(f"may cavitate: wants wider blades above {row.keller_N:.3g} N")
         if target.minutes is not None and row.minutes < target.minutes:
             words.append(f"{row.minutes:.1f} min")
+        short = [f"{row.full_thrust_N / row.asked_N - 1.0:.0%} thrust"] if row.reached < sure else []
+        if target.minutes is not None and row.probability < row.reached:
+            short.append(f"{row.minutes / target.minutes - 1.0:.0%} time")
         if not words and row.probability < sure:
-            words.append(f"{row.full_thrust_N / row.asked_N - 1.0:.0%} thrust in hand: too little for the bands")
+            words.append(f"{' and '.join(short)} in hand: too little for the bands")
         if not words and i:
             more, size = row.power_W / best.power_W - 1.0, row.diameter_in - best.diameter_in
             words.append(f"{more:+.1%} power" + (f", {size:+.3g} in" if more < 0.0 and size > 0.0 else ""))
