@@ -442,7 +442,8 @@ def _rows(loads: RotorLoads, u: LoadScatter, machines: Sequence[KnownMotor], tar
     at, asked, n_at = (np.broadcast_to(v, power.shape)[:, 0] for v in (at, asked, n_at))
     return [
         {"label": loads.label, "diameter_in": loads.diameter_m / INCH, "motor": m.name, "kv": m.kv,
-         "probability": float(chance[i]), "reached": float(reached[i]), "power_W": float(power[i, 0]), "u_power_W": scatter[i],
+         "probability": float(chance[i]), "reached": float(reached[i]),
+         "power_W": float(power[i, 0]), "u_power_W": scatter[i],
          "current_A": float(amps[i, 0]), "peak_A": float(peak[i]),
          "g_per_W": 1e3 * float(at[i]) / G0 / float(power[i, 0]), "minutes": float(minutes[i, 0]),
          "rpm": float(n_at[i]),
