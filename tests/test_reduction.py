@@ -737,3 +737,16 @@ def test_noise_makes_no_plateaus(seed: int) -> None:
     got = find(t, {"thrust_N": thrust}, "thrust_N")
     assert len(got.plateaus) == len(levels) and every_row_once(got)
     assert np.allclose(means(got, "thrust_N"), levels, atol=0.05)
+
+
+def test_a_row_that_repeats_every_sensor_is_no_second_reading() -> None:
+    """As in a table whose last rows were filled with the best one: at full command the speed would seem to stand."""
+    rpm = np.array([3421.0, 5721.0, 7581.0, 9251.0, 10750.0, 12380.0, 14211.0, 16102.0, 17986.0])
+    points = {"pwm_s": np.linspace(1.05e-3, 1.81e-3, rpm.size), "rpm": rpm, "thrust_N": 1.26e-8 * rpm**2 + 1e-3,
+              "current_A": 3e-8 * rpm**2 + 0.4}  # fmt: skip
+    copied = {k: np.append(v, v[-1]) for k, v in points.items()}
+    copied["pwm_s"][-1] = 2e-3
+    found = reduce(recording(copied))
+    assert len(found) == rpm.size and [d.line for d in reduction(found).dropped] == [rpm.size + 2]
+    two = {k: v for k, v in copied.items() if k != "current_A"}  # two rounded readings may be alike
+    assert len(reduce(recording(two))) == rpm.size + 1

@@ -352,10 +352,13 @@ def from_rows(rec: Dataset) -> Found:
     rest = at_rest(rec)
     data = _clean(rec, rest, found)
     _wild(rec, data, rest, found)
+    copied = _copied(data, len(rec)) & ~rest
+    found.lost += lost(rec, np.flatnonzero(copied), "", "every sensor repeats the row before to the last digit")
     time = rec.values.get("time_s")
     loads = [data[name] for name in LOADS if name in data]
     empty = ~np.any([np.isfinite(v) for v in loads], axis=0) if loads else np.ones(len(rec), dtype=bool)
     found.lost += lost(rec, np.flatnonzero(empty), "", "no load, power or coefficient in this row")
+    empty |= copied
     runs, told = runs_of(rec), stated(rec)
     before: dict[float, float] = {}
     at: dict[float, list[int]] = {}
@@ -378,6 +381,15 @@ def from_rows(rec: Dataset) -> Found:
     for run in list(at):
         _close(rec, data, time, at, run, found)
     return found
+
+
+def _copied(data: Mapping[str, Array], rows: int) -> NDArray[np.bool_]:
+    """Rows in which three sensors or more, all that there are, read what they read in the row before, (N,)."""
+    sensors = [v for name in SIGNALS if (v := data.get(name)) is not None and moves(v)]
+    out = np.zeros(rows, dtype=bool)
+    if len(sensors) >= 3:  # two rounded readings may well be alike
+        out[1:] = np.all([v[1:] == v[:-1] for v in sensors], axis=0)
+    return out
 
 
 def _close(
