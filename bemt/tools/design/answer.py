@@ -167,7 +167,7 @@ def _at_an_end(table: pd.DataFrame) -> list[str]:
     kv = float(table.kv.iloc[0])
     for end, word in ((table.kv.max(), "largest"), (table.kv.min(), "smallest")):
         if table.attrs["target"].sized and table.kv.nunique() > 1 and kv == end:
-            return [f"{kv:.0f} is the {word} K_v that was tried: --kv LOW HIGH tries others"]
+            return [f"{kv:.0f} is the {word} K_v that was tried: --kv LOW:HIGH tries others"]
     return []
 
 
