@@ -197,8 +197,20 @@ def _of_model(problem: Problem, add: Add) -> None:
             alone = any(k in problem.covariates for k in e.along)
             spread = PRIORS["form in a variable of its own" if alone else "form of the model"]
             modes = spread * smooth_modes(problem, e.along, law_of(e))
+            size = _fading(problem, share) if alone else share
             for k in range(modes.shape[1]):
-                add(f"form of {e.id}", share * modes[:, k], own=not alone)
+                add(f"form of {e.id}", size * modes[:, k], own=not alone)
+
+
+def _fading(problem: Problem, change: Array) -> Array:
+    """What a law may err by that fades by another power: geometric mean of its change and of the largest, as shares.
+
+    Of walls behind a rotor, Knight and Hefner (1941, NACA TN 835; not checked) have three times as much at four radii as
+    Cheeseman and Bennett, and as much near the wall.  (M,) [units of the readings]
+    """
+    share = np.divide(change, problem.f0, out=np.zeros_like(change), where=problem.f0 != 0.0)
+    largest = np.array([np.max(np.abs(share[problem.channel == c])) for c in problem.channel])
+    return np.asarray(problem.f0 * np.sqrt(np.abs(share) * largest))
 
 
 def _other_forms(e: Effect) -> list[str]:
