@@ -205,12 +205,14 @@ def _of_model(problem: Problem, add: Add) -> None:
 def _fading(problem: Problem, change: Array) -> Array:
     """What a law may err by that fades by another power: geometric mean of its change and of the largest, as shares.
 
-    Of walls behind a rotor, Knight and Hefner (1941, NACA TN 835; not checked) have three times as much at four radii as
-    Cheeseman and Bennett, and as much near the wall.  (M,) [units of the readings]
+    A third of the vortex tube and image of Knight and Hefner (1941, NACA TN 835; not checked) is what Cheeseman and
+    Bennett have near a wall, and three times as much at four radii.  (M,) [units of the readings]
     """
-    share = np.divide(change, problem.f0, out=np.zeros_like(change), where=problem.f0 != 0.0)
-    largest = np.array([np.max(np.abs(share[problem.channel == c])) for c in problem.channel])
-    return np.asarray(problem.f0 * np.sqrt(np.abs(share) * largest))
+    share = np.abs(np.divide(change, problem.f0, out=np.zeros_like(change), where=problem.f0 != 0.0))
+    for c in np.unique(problem.channel):
+        mine = problem.channel == c
+        share[mine] = np.sqrt(share[mine] * np.max(share[mine]))
+    return problem.f0 * share
 
 
 def _other_forms(e: Effect) -> list[str]:
