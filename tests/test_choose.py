@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 import bemt
+from bemt import choose
 from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.rotors.propeller import rotor_of
-from bemt.tools.design.answer import best_of_each, front
+from bemt.tools.design.answer import best_of_each
 from bemt.tools.design.motors_file import KnownMotor, read_motors
-from bemt.tools.design.search import POWER_BAND, choose
+from bemt.tools.design.search import POWER_BAND
 from bemt.tools.drive import drive_result
 
 FEW = ("9x6", "10x4.5", "11x5.5", "10x7")
@@ -100,15 +101,15 @@ def test_a_coaxial_pair_needs_more_than_two_rotors_apart() -> None:
 def test_a_higher_target_is_never_more_probable() -> None:
     motors = [KnownMotor(f"{kv:.0f}", kv) for kv in np.geomspace(600.0, 1600.0, 12)]
     less, more = (choose(T, 3, labels=FEW, motors=motors) for T in (6.0, 8.0))
-    both = less.merge(more, on=["label", "motor"])
+    both = less.merge(more.table, on=["label", "motor"])
     assert (both.probability_y <= both.probability_x + 1e-12).all()
     assert (both.full_thrust_N_x - both.full_thrust_N_y).abs().max() < 1e-6 * both.full_thrust_N_x.max()
 
 
 def test_the_front_falls_with_size(few) -> None:
-    edge = front(few)
+    edge = few.front()
     assert np.all(np.diff(edge.diameter_in) > 0) and np.all(np.diff(edge.power_W) < 0)
-    assert len(best_of_each(few)) == few.label.nunique()
+    assert len(best_of_each(few.table)) == few.label.nunique()
 
 
 def test_time_is_part_of_the_target() -> None:
@@ -248,7 +249,7 @@ def test_the_command_writes_document_table_and_picture(tmp_path, capsys: pytest.
 def test_motors_on_sale_are_named_where_their_list_is_installed() -> None:
     pytest.importorskip("pythrust", reason="extra motors")
     found = bemt.choose(mass_kg=1.4, cells=4, rotors=4, labels=["12x4.5", "13x4.5"])
-    stock = found.table.attrs["on_sale"]
+    stock = found.on_sale.to_dict("records")
     assert len(stock) == len({row["maker"] for row in stock}) > 1
     for row in stock:
         assert row["label"] == found.table.label[0] and row["probability"] >= 0.9
@@ -260,7 +261,7 @@ def test_motors_on_sale_are_named_where_their_list_is_installed() -> None:
     assert heavy["at_N"] - light["at_N"] == pytest.approx(more, rel=0.1)
     named = bemt.choose(mass_kg=1.4, cells=4, rotors=4, labels=[heavy["label"]], motors=heavy["motor"])
     assert named.power_W.iloc[0] == pytest.approx(heavy["power_W"], rel=1e-3)
-    assert named.table.attrs["on_sale"] == ()
+    assert named.on_sale.empty
     with pytest.raises(InputError, match="no motor has"):
         bemt.choose(8.0, 3, motors="Nobody 9999 12345")
 

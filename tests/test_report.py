@@ -464,7 +464,7 @@ def test_like_stands_beside_like_where_the_recording_is_at_another_speed() -> No
     )
     line = Comparison(reference="cfd 5.250 N", source="cfd", S=4.751, D=5.25, u_input=0.4, rpm=6000.0)
     result = Result("one", rows=rows, comparisons=(line,))
-    told = [answer(result), verdict(result)[2], summary(Book("0", (CasePage(result),), (), 0))]
+    told = [answer(result), verdict(result)[2], summary(Book("0", (CasePage(result),), 0))]
     for text in told:
         assert "4.751" in text and "6000" in text and "11.0" not in text and "9000" not in text
     bench = Row("bench", "bench 10 N", 10.0, rpm=9000.0, airspeed_m_s=0.0)
