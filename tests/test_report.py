@@ -825,16 +825,3 @@ def test_no_page_is_wider_than_the_window(opened: Browser, width: int) -> None:
     for page, size in opened.run(wide):
         assert size <= width, page
     assert opened.complaints == []
-
-
-def test_three_fidelities_are_those_of_the_cases_shown(tmp_path: Path) -> None:
-    from bemt.tools.cfd.report import fidelities, fidelity_sections
-
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    (folder / "loads.csv").write_text("source,run,case,J,thrust_N\nBEMT,a,mine,0.4,17.6\ndisk,b,mine,0.4,17.5\n")
-    speeds = ["run,z_over_R,r_over_R,axial_speed_m_s", "a,0,0.5,30", "a,0,0.7,31", "b,-2,0.5,35", "b,-2,0.7,36"]
-    (folder / "wake.csv").write_text("\n".join(speeds))
-    assert [title for title, _ in fidelity_sections(fidelities(tmp_path, ["mine"]))] == ["Loads and cost", "Wake"]
-    assert fidelity_sections(fidelities(tmp_path, ["other"])) == []
-    assert fidelity_sections(fidelities(tmp_path / "nowhere", ["mine"])) == []
