@@ -22,8 +22,9 @@ import io
 import math
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -74,6 +75,7 @@ class Reference:
     density_kg_m3: float = math.nan
     where: str = ""  # ``file:line``
     sha256: str = field(default="", repr=False)  # Hash of the file
+    setup: Mapping[str, Any] = field(default_factory=dict, repr=False)  # Conditions of a CFD run, by name
 
     @property
     def condition(self) -> tuple[float | None, float | None, float | None]:

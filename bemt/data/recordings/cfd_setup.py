@@ -215,65 +215,59 @@ def _one(d: Dataset, name: str, row: int) -> Any:
     return stated_of(d).get(name)
 
 
-def audit_of(
-    d: Dataset, diameter_m: float, pitch_m: float, ducted: bool, a_sound: float, row: int = 0
-) -> tuple[AuditLine, ...]:
-    """Audit of one row of a CFD recording: a run of anybody, or a campaign of our own."""
+def facts_of(get: Callable[[str], Any], own: bool, **flow: float) -> CfdFacts:
+    """Facts of a run, of our campaigns (`own`) or anybody's, by what it states; `flow` M_tip, J, CT and the rotor's.
 
-    def get(name: str) -> Any:
-        return _one(d, name, row)
-
-    rpm = float(d.rpm[row]) if "rpm" in d else math.nan
-    n, V = rpm / 60.0, _number(get("airspeed_m_s"), 0.0)
-    thrust, rho = _number(get("thrust_N")), _number(get("density_kg_m3"), 1.225)
-    solver, own = get("solver"), "balance_mass" in d
-    compressible = get("compressible")
+    `get` gives a condition or a number by its name, None where it is not stated.
+    """
+    names = ("solver", "domain_over_D", "turbulence", "compressible")
+    solver, domain, turbulence, compressible = map(get, names)
     if compressible is None and isinstance(solver, str):
         compressible = {"compressible": True, "incompressible": False}.get(solver)
-    domain = get("domain_over_D")
-    turbulence = str(get("turbulence") or "")
-    facts = CfdFacts(
-        M_tip=math.pi * n * diameter_m / a_sound, J=V / (n * diameter_m) if n > 0 else 0.0,
-        pitch_over_D=pitch_m / diameter_m, CT=thrust / (rho * n**2 * diameter_m**4) if n > 0 else math.nan,
+    return CfdFacts(
         domain_over_D=_number(domain) if domain is not None else _FAR.get(str(get("domain")), math.nan),
         compressible=None if compressible is None else bool(compressible),
         grids=_whole(get("grids"), 0 if own else None), u_grid=_number(get("u_grid")), cells=_number(get("cells")),
         drift=_number(get("drift_thrust")), wall=str(get("wall") or ("function" if own else "")),
-        y_plus=_number(get("y_plus"), _number(get("yplus_avg"))), turbulence=_WALLS.get(turbulence, turbulence),
-        thrust_from="forces" if own or get("thrust_from") == "forces" else "",
-        steady_mrf=True if own else get("steady"), skew_deg=_number(get("sideslip_deg"), 0.0),
-        mass_balance=_number(get("balance_mass")), momentum_balance=_number(get("balance_momentum")), ducted=ducted,
+        y_plus=_number(get("y_plus"), _number(get("yplus_avg"))),
+        turbulence=_WALLS.get(str(turbulence), str(turbulence or "")),
+        thrust_from="forces" if own else str(get("thrust_from") or ""), steady_mrf=True if own else get("steady"),
+        skew_deg=_number(get("sideslip_deg"), 0.0), mass_balance=_number(get("balance_mass")),
+        momentum_balance=_number(get("balance_momentum")), **flow,  # type: ignore[arg-type]
     )  # fmt: skip
-    return audit(facts)
 
 
-_REMARK: Mapping[str, Callable[[Any], str | None]] = {
-    "program": str, "steady": {True: "MRF", False: "sliding mesh"}.get, "turbulence": str,
-    "wall": {"function": "wall functions", "scalable": "scalable wall functions",
-             "automatic": "automatic wall functions"}.get,
-    "compressible": {True: "compressible", False: "incompressible"}.get, "domain_over_D": "domain {:g} D".format,
-    "y_plus": "y+ {:g}".format, "cells": "{:.0f} cells".format,
-    "grids": lambda number: "no grid study" if number < 2 else None,
-    "u_grid": lambda u: f"u_grid {100.0 * u:.3g} %", "drift_thrust": lambda drift: f"drift {100.0 * abs(drift):.3g} %",
-    "thrust_from": lambda word: "forces integrated" if word == "forces" else None,
-}  # fmt: skip
+def audit_of(
+    d: Dataset, diameter_m: float, pitch_m: float, ducted: bool, a_sound: float, row: int = 0
+) -> tuple[AuditLine, ...]:
+    """Audit of one row of a CFD recording."""
+
+    def get(name: str) -> Any:
+        return _one(d, name, row)
+
+    n, V = (float(d.rpm[row]) if "rpm" in d else math.nan) / 60.0, _number(get("airspeed_m_s"), 0.0)
+    thrust, rho = _number(get("thrust_N")), _number(get("density_kg_m3"), 1.225)
+    return audit(facts_of(
+        get, "balance_mass" in d, M_tip=math.pi * n * diameter_m / a_sound, J=V / (n * diameter_m) if n > 0 else 0.0,
+        CT=thrust / (rho * n**2 * diameter_m**4) if n > 0 else math.nan, pitch_over_D=pitch_m / diameter_m,
+        ducted=ducted,
+    ))  # fmt: skip
 
 
-def remark_of(conditions: Mapping[str, Any]) -> str:
-    """Set-up of a run in the set phrases that the audit of references reads.
+def conditions_text(conditions: Mapping[str, Any]) -> str:
+    """Conditions of a run in words.
 
-    >>> remark_of({"steady": True, "turbulence": "k-omega SST", "cells": 2e6, "drift_thrust": 0.004})
-    'MRF; k-omega SST; 2000000 cells; drift 0.4 %; forces integrated'
+    >>> conditions_text({"steady": True, "turbulence": "k-omega SST", "cells": 2e6})
+    'steady yes, turbulence k-omega SST, cells 2,000,000'
     """
-    stated = {"thrust_from": "forces", **conditions}
-    names = (name for name in _REMARK if stated.get(name) is not None and not (name == "grids" and "u_grid" in stated))
-    return "; ".join(words for name in names if (words := _REMARK[name](stated[name])))
+    shown = {k: v for k, v in conditions.items() if k not in ("thrust_from", "drift_thrust", "u_grid")}
+    return ", ".join(f"{k.replace('_', ' ')} {_text(v)}" for k, v in shown.items())
 
 
 def references_of(run: Dataset, where: str) -> list[Reference]:
     """Points of a run as recorded values of a case: thrust, torque, the duct's part."""
     out = []
-    remark = remark_of(stated_of(run))
+    setup = {"thrust_from": "forces", **stated_of(run)}
     loads = (("thrust", "thrust_N", "N"), ("torque", "torque_Nm", "N m"), ("duct_thrust", "duct_thrust_N", "N"))
     sha256 = str(run.provenance.get("sha256", ""))
     for quantity, channel, unit in (*loads, ("CT", "CT", "-"), ("CQ", "CQ", "-")):
@@ -283,8 +277,8 @@ def references_of(run: Dataset, where: str) -> list[Reference]:
                 continue
             state = {k: float(run[k][i]) for k in ("rpm", "airspeed_m_s", "density_kg_m3") if k in run}
             out.append(Reference(
-                quantity, value, float(run.u[channel][i]), channel, "cfd", run.name, remark,
-                f"{number_text(value, 4)} {unit}", where=f"{where}:{i + 1}", sha256=sha256, **state,
+                quantity, value, float(run.u[channel][i]), channel, "cfd", run.name, conditions_text(setup),
+                f"{number_text(value, 4)} {unit}", where=f"{where}:{i + 1}", sha256=sha256, setup=setup, **state,
             ))  # fmt: skip
     return out
 

@@ -18,6 +18,7 @@ from bemt.base.document import Documented
 from bemt.base.page import PageTable, num, table
 from bemt.data.readers import number
 from bemt.data.recordings.audit import Audit, CfdFacts
+from bemt.data.recordings.cfd_setup import facts_of
 from bemt.results.report.book import Book, CasePage, Page, Section, picture, sections
 from bemt.results.report.diagnosis_block import audit_parts
 from bemt.results.report.gather import read_json, safe_files
@@ -28,9 +29,6 @@ from bemt.tools.cfd.schema import RunRow, run_of
 
 SCHEMA = "bemt.cfd-recording/"
 CSV_BYTES = 20_000_000
-DOMAIN_OVER_D = {"free": 5.0, "pipe": 1.0}
-"""Width of the domains of :mod:`bemt.tools.cfd.openfoam` over the rotor's diameter. [1]"""
-TURBULENCE = {"kOmegaSST": "k-omega SST", "realizableKE": "realizable k-epsilon"}
 Loads = Sequence[tuple[float, float, float]]
 """Radius [m], thrust [N/m] and torque [N] per radius."""
 
@@ -164,15 +162,9 @@ def _facts(run: ShownRun, c: CaseConditions, ducted: bool, levels: int) -> CfdFa
     D, n = c.diameter_m, run.rpm / 60.0
     T, u = abs(run.thrust_N), run.u_thrust_N
     grid = math.sqrt(max((u / T) ** 2 - run.scatter_thrust**2, 0.0)) if T > 0 and levels > 1 else math.nan
-    return CfdFacts(
-        M_tip=math.pi * D * n / c.a_sound_m_s, J=run.airspeed_m_s / (n * D), cells=run.cells,
-        pitch_over_D=c.pitch_075R_m / D, CT=run.thrust_N / (run.density_kg_m3 * n**2 * D**4),
-        domain_over_D=DOMAIN_OVER_D.get(run.domain, math.nan), compressible=run.solver == "compressible",
-        grids=levels, u_grid=grid if grid > 0 else math.nan, drift=run.drift_thrust, wall="function",
-        y_plus=run.yplus_avg, turbulence=TURBULENCE.get(run.turbulence, run.turbulence), thrust_from="forces",
-        steady_mrf=True, skew_deg=0.0 if math.isnan(run.sideslip_deg) else run.sideslip_deg,
-        mass_balance=run.balance_mass, momentum_balance=run.balance_momentum, ducted=ducted,
-    )  # fmt: skip
+    told = {**vars(run), "grids": levels, "u_grid": grid if grid > 0 else math.nan}
+    return facts_of(told.get, True, M_tip=math.pi * D * n / c.a_sound_m_s, J=run.airspeed_m_s / (n * D), ducted=ducted,
+                    pitch_over_D=c.pitch_075R_m / D, CT=run.thrust_N / (run.density_kg_m3 * n**2 * D**4))  # fmt: skip
 
 
 def _plain_rows(found: Sequence[Runs], result: Result) -> list[Row]:
