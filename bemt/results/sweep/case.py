@@ -227,7 +227,8 @@ def _recorded_rows(
             known = {k: get.get(k, math.nan) for k in (*COMPARED, "rpm", "airspeed_m_s", "density_kg_m3")}
             row = _row(group.kind, f"{group.kind} {first.printed}", known.pop("thrust_N"), **known,
                        M_tip=nominal.M_tip[at], Re=nominal.Re75[at], u=u.get("thrust_N", math.nan),
-                       origin=str(full.provenance.get("source", "")), remark=str(full.provenance.get("remark", "")))  # fmt: skip
+                       origin=str(full.provenance.get("source", "")),
+                       remark=str(full.provenance.get("remark", "")))  # fmt: skip
             rows.append((row, at, u, first.setup))
     return rows
 
@@ -258,7 +259,8 @@ def _audit(row: Row, setup: Mapping[str, Any], ready: Model | PairModel, ducted:
     from bemt.data.recordings.cfd_setup import facts_of
 
     D = ready.diameter_m
-    facts = facts_of((setup or setup_in(row.remark or "")).get, M_tip=float(row.M_tip), CT=row.CT, ducted=ducted,
+    stated = setup or setup_in(row.remark or "")
+    facts = facts_of(stated.get, False, M_tip=float(row.M_tip), CT=row.CT, ducted=ducted,
                      J=row.airspeed_m_s / (row.rpm / 60.0 * D), pitch_over_D=ready.pitch_m / D)  # fmt: skip
     return Audit.of(row.label, facts)
 
