@@ -16,11 +16,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import get_origin
 
+import effects_page
+
 from bemt.base.toml import FieldLimits, Table, expected, limits_of
 from bemt.data.readers.cfd_run import RunColumn, RunColumns, RunToml
 from bemt.data.readers.recording_toml import ColumnsTable, ColumnTable, RecordingToml
 from bemt.judge.diagnose.nuisance import PRIORS
-from bemt.results.report import effects_list
 from bemt.rotors.case import Case, load_case
 from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.case.schema import GROUPS, CaseFile
@@ -287,7 +288,7 @@ def main() -> None:
     page = DOCS / "command_line.md"
     page.write_text(commands(page.read_text(encoding="utf-8")), encoding="utf-8")
     (DOCS / "reference_files.md").write_text(files(), encoding="utf-8")
-    (DOCS / "effects.md").write_text(effects_list.markdown(), encoding="utf-8")
+    (DOCS / "effects.md").write_text(effects_page.page(), encoding="utf-8")
     cases = shipped()
     if "--no-pictures" not in sys.argv:
         scenes = []
