@@ -6,6 +6,7 @@ a number, a text, or NaN with a flag on its row. Headings are read in :mod:`bemt
 
 from __future__ import annotations
 
+import difflib
 import os
 import re
 import shlex
@@ -23,14 +24,16 @@ from bemt.base.errors import Fault, refuse
 from bemt.base.tables import number_of
 from bemt.data.readers import load_text
 from bemt.data.readers._large import NumberTable
-from bemt.data.readers._words import english
+from bemt.data.readers._words import english, quantities
 from bemt.data.readers.headings import (
     CELLS,
     Heading,
     heading,
     in_usual_unit,
+    may_be_shaft_speed,
     meanings,
     slug,
+    surely_shaft_speed,
 )
 from bemt.data.readers.samples import Channel, clock_seconds, dataset, spikes
 from bemt.data.readers.split import (
@@ -333,7 +336,7 @@ class Builder:
             note = f"text, kept as such, in {number_of(len(self.words), 'column')}: {some(self.words, 8)}"
             self.warnings.append(note)
         if self.unitless:
-            hint = "Name units in the headings or in a recording.toml"
+            hint = "Name units in the headings or in a recording.toml" + _nearest(self.unitless, self.channels)
             self.warnings.append(f"no unit known, none assumed, for {some(self.unitless, 8)}. {hint}")
         asks = [*self.asks, *_asked(self.unitless, self.channels)]
         if asks and self.format == "table":
@@ -370,17 +373,63 @@ def slip(ratio: float) -> str:
     return " (the sign differs)" if abs(ratio + 1.0) < SLIP else ""
 
 
-def _asked(headings: Sequence[str], channels: Iterable[str]) -> list[str]:
-    """Options of ``bemt import`` that state the unit of headings whose words are one quantity that the file has not.
+_MEANINGS = ("rpm", "thrust", "torque", "voltage", "current", "power", "time", "airspeed", "throttle", "pressure",
+             "temperature", "density", "humidity")  # fmt: skip
 
-    >>> _asked(["'Schub'", "'speed'", "'x'"], ["airspeed_m_s"])
-    ['--unit Schub=UNIT', '--unit speed=UNIT']
-    """
+
+def _asked(headings: Sequence[str], channels: Iterable[str]) -> list[str]:
+    """Options of ``bemt import`` that state the unit of headings whose words are one quantity."""
     out: dict[str, str] = {}
     for label in headings:
         name = label[1:].rsplit("'", 1)[0].split("' (")[0]
-        found = {q for q in meanings(name) if not any(k == q or k.startswith(f"{q}_") for k in channels)}
+        found = set(meanings(name))
         found -= {"pulse_width"} if "throttle" in found else set()
-        if len(found) == 1:
-            out.setdefault(found.pop(), f"--unit {shlex.quote(name)}=UNIT")
+        quantity = found.pop() if len(found) == 1 else ""
+        if quantity and not any(k.startswith(f"{quantity}_") for k in channels):
+            out.setdefault(quantity, f"--unit {shlex.quote(name)}=UNIT")
     return list(out.values())
+
+
+def _nearest(headings: Sequence[str], channels: Iterable[str] = ()) -> str:
+    r"""What headings without a unit may mean, and the line of a recording.toml that says so; empty: nothing is near.
+
+    A bare ``speed`` is that of the shaft or of the air, whichever the file has not.
+
+    >>> _nearest(["'Trust'", "'x'"])  # doctest: +ELLIPSIS
+    '; nearest meaning: \'Trust\' thrust. The line: [columns] thrust = { column = "Trust", unit = "..." }, unit N, ...'
+    >>> _nearest(["'speed'"], ["airspeed_m_s"])  # doctest: +ELLIPSIS
+    '; nearest meaning: \'speed\' rpm. The line: [columns] rpm = { column = "speed", unit = "..." }, unit rpm, ...'
+    """
+    near: dict[str, list[str]] = {}
+    for label in headings:
+        name = label.split("'")[1] if "'" in label else label
+        word = re.split(r"[\s_(\[]", name.strip().lower())[0]
+        found = _speeds_meant(name, channels) if may_be_shaft_speed(name) else None
+        if found is None:
+            known = [q for q, _ in quantities(english(name)) if q in _MEANINGS]
+            found = known[:1] or difflib.get_close_matches(word, _MEANINGS, 1, 0.75)
+        if found:
+            near[name] = found
+    if not near:
+        return ""
+    name, meanings = next(iter(near.items()))
+    lines = [f'{m} = {{ column = "{name}", unit = "..." }}, unit {_UNITS_MEANT[m]}' for m in meanings]
+    told = ", ".join(f"{k!r} {' or '.join(v)}" for k, v in near.items())
+    return f"; nearest meaning: {told}. The line: [columns] {', or '.join(lines)}"
+
+
+_UNITS_MEANT = {
+    "rpm": "rpm, krpm, rev_s or rad_s", "thrust": "N, kgf, gf, lbf or ozf", "voltage": "V or mV",
+    "torque": "Nm, mNm, kgf_cm, gf_cm or lbf_in", "current": "A or mA", "power": "W or kW", "time": "s or ms",
+    "airspeed": "m_s, km_h, kt or mph", "throttle": "pct", "pressure": "Pa, hPa or mbar", "temperature": "C, K or F",
+    "density": "kg_m3", "humidity": "pct",
+}  # fmt: skip
+"""Units that a column of each meaning usually has; which, the file does not say."""
+
+
+def _speeds_meant(name: str, channels: Iterable[str]) -> list[str]:
+    """Speeds that a heading may mean, of those that the file has not yet."""
+    known = list(channels)
+    turning = any(re.search(r"(^|_)rpm|rad_s$", k) for k in known)
+    moving = any(k == "J" or k.endswith("_m_s") for k in known)
+    return [*([] if turning else ["rpm"]), *([] if moving or surely_shaft_speed(name) else ["airspeed"])]
