@@ -74,10 +74,6 @@ RESULTS = ("design.json", "design.png")
 MUCH = 1.05  # Thrust over that asked for from which on the text says why
 
 
-def _at(V: float) -> str:
-    return "static" if V == 0.0 else f"at {V:g} m/s"
-
-
 def _row(
     name: str, rpm: float, thrust: str, power: str, T: float, V: float, P: float, mach: float, d: Design
 ) -> list[str]:
@@ -132,7 +128,7 @@ def text(d: Design) -> str:
     need, several = d.need, len(d.need.points) > 1
     lines = [
         f"{d.name}: {2.0 * need.R / INCH:.4g} in, {need.blades} blades, "
-        + "; ".join(f"{p.thrust_N:g} N {_at(p.airspeed_m_s)}" + ("" if p.weight else " (floor)") for p in need.points),
+        + "; ".join(f"{p.thrust_N:g} N {p.at}" + ("" if p.weight else " (floor)") for p in need.points),
         "",
     ]
     quality = "eta" if all(p.airspeed_m_s for p in need.points) else "eta, FM" if several else "FM"
