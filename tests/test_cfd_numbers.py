@@ -16,8 +16,7 @@ from bemt.base.averaging import keep_last, relation, revolution_average, steady_
 from bemt.base.errors import InputError
 from bemt.base.tables import json_text
 from bemt.data.recordings import audit as au
-from bemt.data.recordings.audit import STATUSES, Audit, AuditLine, CfdFacts, audit, combined, setup_in
-from bemt.data.recordings.cfd_setup import facts_of
+from bemt.data.recordings.audit import STATUSES, Audit, AuditLine, CfdFacts, audit, combined, facts_of, setup_in
 from bemt.data.recordings.grid_study import grid_study, ratios
 
 

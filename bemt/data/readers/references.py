@@ -186,7 +186,7 @@ def _reference(row: _Row) -> Reference | None:
         quantity, value * factor, u * factor, QUANTITIES[quantity][1], kind, source, remark,
         f"{text} {unit}".removesuffix(" -"), where=f"{row.source.name}:{row.line}",
         sha256=row.source.sha256,
-        **conditions,
+        **conditions,  # type: ignore[arg-type]
     )  # fmt: skip
 
 

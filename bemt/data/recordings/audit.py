@@ -27,6 +27,8 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from numbers import Real
+from typing import Any
 
 from bemt.base.document import Documented
 from bemt.physics.k1k2 import ZERO_THRUST_MEASURED
@@ -304,3 +306,38 @@ def setup_in(remark: str) -> dict[str, float | bool | str]:
     {'wall': 'automatic', 'steady': True, 'turbulence': 'k-omega SST'}
     """
     return {k: v for pattern, told in _PHRASES if re.search(pattern, remark, re.IGNORECASE) for k, v in told.items()}
+
+
+_WALLS = {"kOmegaSST": "k-omega SST", "realizableKE": "realizable k-epsilon"}
+_FAR = {"free": 5.0, "pipe": 1.0}  # Domain of our own campaigns over the disk, diameters [1] (reports/cfd)
+
+
+def facts_of(get: Callable[[str], Any], own: bool, **flow: float) -> CfdFacts:
+    """Facts of a run, of our campaigns (`own`) or anybody's, by what it states; `flow` M_tip, J, CT and the rotor's.
+
+    `get` gives a condition or a number by its name, None where it is not stated.
+    """
+    names = ("solver", "domain_over_D", "turbulence", "compressible")
+    solver, domain, turbulence, compressible = map(get, names)
+    if compressible is None and isinstance(solver, str):
+        compressible = {"compressible": True, "incompressible": False}.get(solver)
+    return CfdFacts(
+        domain_over_D=number_or(domain) if domain is not None else _FAR.get(str(get("domain")), math.nan),
+        compressible=None if compressible is None else bool(compressible),
+        grids=_whole(get("grids"), 0 if own else None), u_grid=number_or(get("u_grid")), cells=number_or(get("cells")),
+        drift=number_or(get("drift_thrust")), wall=str(get("wall") or ("function" if own else "")),
+        y_plus=number_or(get("y_plus"), number_or(get("yplus_avg"))),
+        turbulence=_WALLS.get(str(turbulence), str(turbulence or "")),
+        thrust_from="forces" if own else str(get("thrust_from") or ""), steady_mrf=True if own else get("steady"),
+        skew_deg=number_or(get("sideslip_deg"), 0.0), mass_balance=number_or(get("balance_mass")),
+        momentum_balance=number_or(get("balance_momentum")), **flow,  # type: ignore[arg-type]
+    )  # fmt: skip
+
+
+def number_or(value: Any, other: float = math.nan) -> float:
+    """A finite number, else the other."""
+    return float(value) if isinstance(value, Real) and math.isfinite(value) else other
+
+
+def _whole(value: Any, other: int | None) -> int | None:
+    return int(value) if isinstance(value, (int, float)) and math.isfinite(value) else other

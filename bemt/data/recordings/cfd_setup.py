@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from bemt.base.tables import number_text
 from bemt.data.readers.references import Reference
-from bemt.data.recordings.audit import AuditLine, CfdFacts, audit
+from bemt.data.recordings.audit import AuditLine, audit, facts_of, number_or
 from bemt.physics.dataset import Dataset
 
 if TYPE_CHECKING:
@@ -201,10 +201,6 @@ def grid_that_differs(a: Dataset, b: Dataset) -> str:
     return "the grid differs: " + "; ".join(f"{words[k]} {one} and {two}" for k, (one, two) in differ.items())
 
 
-_WALLS = {"kOmegaSST": "k-omega SST", "realizableKE": "realizable k-epsilon"}
-_FAR = {"free": 5.0, "pipe": 1.0}  # Domain of our own campaigns over the disk, diameters [1] (reports/cfd)
-
-
 def _one(d: Dataset, name: str, row: int) -> Any:
     """A condition of one row, by any of its names; None where it is not stated."""
     for key in (name, *(k for k, v in _ALIAS.items() if v == name)):
@@ -215,28 +211,6 @@ def _one(d: Dataset, name: str, row: int) -> Any:
     return stated_of(d).get(name)
 
 
-def facts_of(get: Callable[[str], Any], own: bool, **flow: float) -> CfdFacts:
-    """Facts of a run, of our campaigns (`own`) or anybody's, by what it states; `flow` M_tip, J, CT and the rotor's.
-
-    `get` gives a condition or a number by its name, None where it is not stated.
-    """
-    names = ("solver", "domain_over_D", "turbulence", "compressible")
-    solver, domain, turbulence, compressible = map(get, names)
-    if compressible is None and isinstance(solver, str):
-        compressible = {"compressible": True, "incompressible": False}.get(solver)
-    return CfdFacts(
-        domain_over_D=_number(domain) if domain is not None else _FAR.get(str(get("domain")), math.nan),
-        compressible=None if compressible is None else bool(compressible),
-        grids=_whole(get("grids"), 0 if own else None), u_grid=_number(get("u_grid")), cells=_number(get("cells")),
-        drift=_number(get("drift_thrust")), wall=str(get("wall") or ("function" if own else "")),
-        y_plus=_number(get("y_plus"), _number(get("yplus_avg"))),
-        turbulence=_WALLS.get(str(turbulence), str(turbulence or "")),
-        thrust_from="forces" if own else str(get("thrust_from") or ""), steady_mrf=True if own else get("steady"),
-        skew_deg=_number(get("sideslip_deg"), 0.0), mass_balance=_number(get("balance_mass")),
-        momentum_balance=_number(get("balance_momentum")), **flow,  # type: ignore[arg-type]
-    )  # fmt: skip
-
-
 def audit_of(
     d: Dataset, diameter_m: float, pitch_m: float, ducted: bool, a_sound: float, row: int = 0
 ) -> tuple[AuditLine, ...]:
@@ -245,8 +219,8 @@ def audit_of(
     def get(name: str) -> Any:
         return _one(d, name, row)
 
-    n, V = (float(d.rpm[row]) if "rpm" in d else math.nan) / 60.0, _number(get("airspeed_m_s"), 0.0)
-    thrust, rho = _number(get("thrust_N")), _number(get("density_kg_m3"), 1.225)
+    n, V = (float(d.rpm[row]) if "rpm" in d else math.nan) / 60.0, number_or(get("airspeed_m_s"), 0.0)
+    thrust, rho = number_or(get("thrust_N")), number_or(get("density_kg_m3"), 1.225)
     return audit(facts_of(
         get, "balance_mass" in d, M_tip=math.pi * n * diameter_m / a_sound, J=V / (n * diameter_m) if n > 0 else 0.0,
         CT=thrust / (rho * n**2 * diameter_m**4) if n > 0 else math.nan, pitch_over_D=pitch_m / diameter_m,
@@ -281,14 +255,6 @@ def references_of(run: Dataset, where: str) -> list[Reference]:
                 f"{number_text(value, 4)} {unit}", where=f"{where}:{i + 1}", sha256=sha256, setup=setup, **state,
             ))  # fmt: skip
     return out
-
-
-def _number(value: Any, other: float = math.nan) -> float:
-    return float(value) if isinstance(value, (int, float, np.floating)) and math.isfinite(value) else other
-
-
-def _whole(value: Any, other: int | None) -> int | None:
-    return int(value) if isinstance(value, (int, float)) and math.isfinite(value) else other
 
 
 def faults_first(lines: Iterable[AuditLine]) -> list[AuditLine]:

@@ -255,8 +255,7 @@ def _comparisons(recorded: list[Recorded], models: Mapping[str, Dataset]) -> tup
 
 def _audit(row: Row, setup: Mapping[str, Any], ready: Model | PairModel, ducted: bool) -> Audit:
     """Audit of a recorded CFD value by its set-up, else by its remark."""
-    from bemt.data.recordings.audit import Audit, setup_in
-    from bemt.data.recordings.cfd_setup import facts_of
+    from bemt.data.recordings.audit import Audit, facts_of, setup_in
 
     D = ready.diameter_m
     stated = setup or setup_in(row.remark or "")

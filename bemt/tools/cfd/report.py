@@ -17,8 +17,7 @@ from typing import Any
 from bemt.base.document import Documented
 from bemt.base.page import PageTable, num, table
 from bemt.data.readers import number
-from bemt.data.recordings.audit import Audit, CfdFacts
-from bemt.data.recordings.cfd_setup import facts_of
+from bemt.data.recordings.audit import Audit, CfdFacts, facts_of
 from bemt.results.report.book import Book, CasePage, Page, Section, picture, sections
 from bemt.results.report.diagnosis_block import audit_parts
 from bemt.results.report.gather import read_json, safe_files

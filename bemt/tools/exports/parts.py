@@ -97,7 +97,8 @@ def hub_loads(doc: Mapping[str, Any], rho: float, D: float, rpm: Array, V: Array
     n = rpm / 60.0
     tables = np.array([doc[name] for name in COEFFICIENTS], dtype=float)
     arms = np.array([1.0, D / (2.0 * np.pi), 1.0, 1.0, D, D])
-    return held(axes, tables, rpm, V / (n * D), side / (n * D)) * arms[:, None] * rho * n**2 * D**4
+    scale: Array = arms[:, None] * rho * n**2 * D**4
+    return held(axes, tables, rpm, V / (n * D), side / (n * D)) * scale
 
 
 WRENCH_CODE = '''
