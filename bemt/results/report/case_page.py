@@ -126,7 +126,7 @@ def _performance(page: CasePage) -> Section:
         most = None
         if name == "eta":  # of the least thrust in the band, as the limit falls with thrust
             most = co.eta_limit(j.J, 0.0 if result.fan else j.CT - j.u["CT"])
-        traces = [Trace("BEMT", j.J, y, j.u[name], COLOURS["bemt"], ceiling=most)]
+        traces = [Trace("BEMT", j.J, y, j.u[name], ceiling=most)]
         if name == "CT":
             traces.append(Trace("K1/K2", j.J, c.k1k2_CT, None, COLOURS["k1k2"], "7 4"))
         if name != "eta":
@@ -143,7 +143,7 @@ def _performance(page: CasePage) -> Section:
         ("Thrust per shaft power", "thrust per power [N/kW]", per_kW, None, [], ""),
     ):
         seen = _points(page, "rpm", channel, lambda r: near(r.airspeed_m_s, own.airspeed_m_s)) if channel else []
-        traces = [Trace("BEMT", w.rpm, y, u, COLOURS["bemt"]), *more, *seen]
+        traces = [Trace("BEMT", w.rpm, y, u), *more, *seen]
         title = f"{title} at {own.airspeed_m_s:g} m/s"
         plots.append(Plot(title, "rotational speed [rev/min]", label, traces, x_zero=True))
     words = (
@@ -202,10 +202,9 @@ def _verification(page: CasePage) -> Section:
     v = page.refinement
     if v is None:
         return "", []
-    line = Trace("BEMT", v.stations, v.thrust_N, colour=COLOURS["bemt"])
-    plot = figure(
-        Plot("Thrust against blade elements", "blade elements [-]", "thrust [N]", [line], log_x=True, zero=False)
-    )
+    line = Trace("BEMT", v.stations, v.thrust_N)
+    title = "Thrust against blade elements"
+    plot = figure(Plot(title, "blade elements [-]", "thrust [N]", [line], log_x=True, zero=False))
     solved = zip(v.stations, v.thrust_N.tolist(), v.torque_Nm.tolist(), strict=True)
     rows = [[num(n), num(T, 7), num(Q, 6)] for n, T, Q in solved]
     words, study = [], v.grid_study
