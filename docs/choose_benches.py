@@ -22,10 +22,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from bemt import choose
 from bemt.base.units import G0, INCH
 from bemt.data.readers.uiuc_names import class_of, parse_file_name
 from bemt.tools.design.motors_file import KnownMotor
-from bemt.tools.design.search import choose
 
 Array = NDArray[np.float64]
 LBF = 4.4482216

@@ -6,10 +6,8 @@ import re
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
-from bemt.tools.design.answer import best_of_each
-from bemt.tools.design.search import choose
+from bemt import choose
+from bemt.tools.design.answer import DriveChoice, best_of_each
 
 PAGE = Path(__file__).resolve().parent / "choose.md"
 REQUESTS: tuple[tuple[str, dict[str, Any]], ...] = (
@@ -37,17 +35,18 @@ HEAD = (
 )
 
 
-def row(words: str, table: pd.DataFrame) -> str:
+def row(words: str, found: DriveChoice) -> str:
     """Line of the table."""
-    first, sure = table.iloc[0], table.attrs["sure"]
-    if first.probability < sure:
+    table = found.table
+    first = table.iloc[0]
+    if first.probability < found.sure:
         most = table.loc[table.full_thrust_N.idxmax()]
         return f"| {words} | none is sure; {most.label} gives {most.full_thrust_N:.3g} N |" + " |" * 7
     even = table[(table.label == first.label) & (table.probability >= 0.5)].kv.min()
-    least = best_of_each(table[table.probability >= sure]).sort_values("power_W").iloc[0]
+    least = best_of_each(found.good).sort_values("power_W").iloc[0]
     gain = 1.0 - least.power_W / first.power_W
     other = "the same" if least.label == first.label else f"{least.label}, {gain:.1%} less"
-    stock = next((f"{m['motor']}, {m['motor_g']:.0f} g, {m['power_W']:.3g} W" for m in table.attrs["on_sale"]), "-")
+    stock = next((f"{m.motor}, {m.motor_g:.0f} g, {m.power_W:.3g} W" for m in found.on_sale.itertuples()), "-")
     cells = (words, first.label, f"{first.kv:.0f} ({even:.0f})", f"{first.power_W:.3g} ± {first.u_power_W:.2g}",
              f"{first.g_per_W:.3g}", f"{first.full_thrust_N:.3g}", f"{first.propulsion_g:.0f}", other,
              stock)  # fmt: skip

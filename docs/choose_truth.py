@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from bemt import choose
 from bemt.base.units import G0
 from bemt.tools.design.motors_file import KnownMotor
-from bemt.tools.design.search import choose
 
 LOADED_CELL_V = 3.84 * 0.94
 """Voltage of a cell at half charge and full throttle, as `choose` takes it [V]."""

@@ -16,18 +16,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import get_origin
 
+import effects_page
+
 from bemt.base.toml import FieldLimits, Table, expected, limits_of
 from bemt.data.readers.cfd_run import RunColumn, RunColumns, RunToml
 from bemt.data.readers.recording_toml import ColumnsTable, ColumnTable, RecordingToml
 from bemt.judge.diagnose.nuisance import PRIORS
-from bemt.results.report import effects_list
 from bemt.rotors.case import Case, load_case
 from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.case.schema import GROUPS, CaseFile
 from bemt.rotors.case.unknowns import completed
 from bemt.tools.cfd.schema import AxesTable, CampaignFile
 from bemt.tools.drive.motor_result import MotorToml
-from bemt.tools.drive.thrusters_result import ThrustersFile
 
 CASES = ("ds30", "prop_8x5", "prop_10x5", "prop_12x6", "prop_14x8")
 """Cases on the pages: the shipped ones, whatever else is in the folder."""
@@ -113,7 +113,6 @@ FILES: dict[str, tuple[type[Table], str]] = {
         "Measurements of a motor constant, for `bemt lab motor` "
         "([one with its recordings](../reports/drive/motor_mn4006/motor.toml)).",
     ),
-    "thrusters": (ThrustersFile, "For `bemt lab thrusters` ([example](files/thrusters.toml))."),
     "campaign": (CampaignFile, "OpenFOAM runs of one case, for `bemt cfd` ([example](files/campaign.toml))."),
 }
 """Files on the reference page: model, and what the file is for."""
@@ -289,7 +288,7 @@ def main() -> None:
     page = DOCS / "command_line.md"
     page.write_text(commands(page.read_text(encoding="utf-8")), encoding="utf-8")
     (DOCS / "reference_files.md").write_text(files(), encoding="utf-8")
-    (DOCS / "effects.md").write_text(effects_list.markdown(), encoding="utf-8")
+    (DOCS / "effects.md").write_text(effects_page.page(), encoding="utf-8")
     cases = shipped()
     if "--no-pictures" not in sys.argv:
         scenes = []

@@ -302,7 +302,7 @@ def blend(a: Airfoil, b: Airfoil, w: float) -> Airfoil:
     if w == 1.0:
         return b
     n = max(a.x.size, b.x.size)
-    pa, pb = a.repanel(n + (n + 1) % 2 if n > 20 else 21), b.repanel(n + (n + 1) % 2 if n > 20 else 21)
+    pa, pb = (section.repanel(n + (n + 1) % 2 if n > 20 else 21) for section in (a, b))
     name = f"{1 - w:.3f}*{a.name}+{w:.3f}*{b.name}"
     return Airfoil(name, (1 - w) * pa.x + w * pb.x, (1 - w) * pa.y + w * pb.y)
 
@@ -363,10 +363,8 @@ def parse_dat(text: str, name: str = "") -> Airfoil:
     if len(rows) < 7 and not faults.found:
         faults.add("section file", f"{len(rows)} points", "7 points or more", "Is it a coordinate file?")
     if counts is not None and sum(counts) != len(rows) and not faults.found:
-        faults.add(
-            "section file", f"{len(rows)} points", f"{counts[0]} + {counts[1]} as its second line says",
-            "Truncated file?",
-        )  # fmt: skip
+        wanted = f"{counts[0]} + {counts[1]} as its second line says"
+        faults.add("section file", f"{len(rows)} points", wanted, "Truncated file?")
     faults.check()
     points = np.array([row[1:] for row in rows])
     if not (abs(points[:, 0].max() - 1) <= 0.02 and abs(points[:, 0].min()) <= 0.02):
@@ -426,12 +424,10 @@ def published(name: str) -> Airfoil:
     if name == "sda1075":
         x, y = np.array(_SDA1075).T
         return Airfoil(name, x, y)
-    faults = Faults()
     if name != "clark_y":
-        faults.add("published section", repr(name), " or ".join(PUBLISHED))
-    faults.check()
+        raise GeometryError([("published section", repr(name), " or ".join(PUBLISHED), "")])
     s, upper, lower = 0.01 * np.array(_CLARK_Y).T
-    x = 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, 81)))
+    x = _spaced(81)
     # both sides leave the nose like a root
     high, low = (pchip(np.sqrt(s), side, np.sqrt(x)) for side in (upper, lower))
     nose, tail = np.array([0.0, upper[0]]), np.array([1.0, 0.5 * (upper[-1] + lower[-1])])

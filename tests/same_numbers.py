@@ -38,7 +38,7 @@ COMMANDS: dict[str, list[str]] = {
     "drive": ["drive", "cases/ds30", "--json"],
     "map": ["map", f"{D}/thrust_map/xNova-SR-steps.csv", "--sign", "-1", "--json"],
     "motor": ["motor", "reports/drive/motor_mn4006", "--json"],
-    "cfd": ["cfd", "reports/cfd", "--json"],
+    "cfd": ["reports/studies/own_cfd.py", "reports/cfd", "--json"],
     "calibrate": ["calibrate", f"{D}/uiuc/volume-1", "--test", f"{D}/uiuc/volume-2", "--json"],
     "estimate": ["estimate", "10x5", "--rpm", "6000", "--airspeed-m-s", "5", "10", "--json"],
     "effects": ["effects", "--json"],

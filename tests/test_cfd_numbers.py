@@ -16,7 +16,7 @@ from bemt.base.averaging import keep_last, relation, revolution_average, steady_
 from bemt.base.errors import InputError
 from bemt.base.tables import json_text
 from bemt.data.recordings import audit as au
-from bemt.data.recordings.audit import STATUSES, Audit, AuditLine, CfdFacts, audit, combined, facts_from_remark
+from bemt.data.recordings.audit import STATUSES, Audit, AuditLine, CfdFacts, audit, combined, facts_of, setup_in
 from bemt.data.recordings.grid_study import grid_study, ratios
 
 
@@ -296,7 +296,7 @@ def line(facts: CfdFacts, topic: str) -> AuditLine:
     return next(item for item in audit(facts) if item.topic == topic)
 
 
-@pytest.mark.parametrize("facts", [CfdFacts(), GOOD, replace(GOOD, ducted=True), facts_from_remark(THESIS)])
+@pytest.mark.parametrize("facts", [CfdFacts(), GOOD, replace(GOOD, ducted=True), facts_of(setup_in(THESIS).get, False)])
 def test_every_audit_has_every_topic_once(facts: CfdFacts) -> None:
     lines = audit(facts)
     assert [item.topic for item in lines] == TOPICS
@@ -323,7 +323,7 @@ def test_a_run_with_everything_known_has_a_number() -> None:
 
 
 def test_the_thesis_is_found_out() -> None:
-    facts = facts_from_remark(THESIS, CfdFacts(M_tip=0.625, pitch_over_D=0.625, CT=0.11))
+    facts = facts_of(setup_in(THESIS).get, False, M_tip=0.625, pitch_over_D=0.625, CT=0.11)
     assert (facts.domain_over_D, facts.grids, facts.thrust_from) == (1.0, 0, "node")
     assert (facts.wall, facts.turbulence, facts.steady_mrf) == ("scalable", "realizable k-epsilon", True)
     assert facts.compressible is None, "the thesis does not say"
@@ -425,31 +425,26 @@ def test_rules_of_an_open_propeller_are_not_used_for_a_duct() -> None:
 
 
 @pytest.mark.parametrize(
-    ("remark", "field", "value"),
+    ("stated", "field", "value"),
     [
-        ("incompressible", "compressible", False),
-        ("compressible", "compressible", True),
-        ("drift 0.4 %", "drift", 0.004),
-        ("mass balance 0.2 %", "mass_balance", 0.002),
-        ("forces and momentum balance 12 %", "momentum_balance", 0.12),
-        ("GCI 2.3 %", "u_grid", 0.02),
-        ("domain 10 D", "domain_over_D", 10.0),
-        ("249000 cells", "cells", 249000.0),
-        ("sliding mesh", "steady_mrf", False),
-        ("skew 30 deg", "skew_deg", 30.0),
+        ({"solver": "incompressible"}, "compressible", False), ({"drift_thrust": 0.004}, "drift", 0.004),
+        ({"balance_mass": 0.002}, "mass_balance", 0.002), ({"balance_momentum": 0.12}, "momentum_balance", 0.12),
+        ({"domain": "free"}, "domain_over_D", 5.0), ({"cells": 249000.0}, "cells", 249000.0),
+        ({"yplus_avg": 51.0}, "y_plus", 51.0), ({"sideslip_deg": 30.0}, "skew_deg", 30.0),
+        (setup_in("sliding mesh"), "steady_mrf", False), (setup_in("compressible"), "compressible", True),
     ],
-)
-def test_set_phrases_are_read(remark: str, field: str, value: object) -> None:
-    assert getattr(facts_from_remark(remark), field) == value
+)  # fmt: skip
+def test_what_a_run_states_becomes_its_facts(stated: dict[str, object], field: str, value: object) -> None:
+    assert getattr(facts_of(stated.get, False), field) == value
 
 
 def test_other_words_say_nothing() -> None:
-    assert facts_from_remark("a nice picture; ran on Tuesday; the propeller is 8 in") == replace(CfdFacts())
+    assert setup_in("a nice picture; ran on Tuesday; the propeller is 8 in") == {}
 
 
 @pytest.mark.parametrize("CT", [0.11, math.nan])
 def test_a_recorded_value_is_audited_by_its_remark(CT: float) -> None:
-    known = CfdFacts(M_tip=0.63, J=0.0, pitch_over_D=0.625, CT=CT, ducted=False)
-    found = Audit.of("cfd 2.6 kgf", facts_from_remark(THESIS, known))
+    facts = facts_of(setup_in(THESIS).get, False, M_tip=0.63, J=0.0, pitch_over_D=0.625, CT=CT, ducted=False)
+    found = Audit.of("cfd 2.6 kgf", facts)
     assert found.reference == "cfd 2.6 kgf" and [line.topic for line in found.lines] == TOPICS
     assert Audit.from_document(json.loads(json_text(found.document()))).lines[0].status == found.lines[0].status

@@ -12,6 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+import effects_page
 import numpy as np
 import pytest
 
@@ -473,15 +474,15 @@ def printed(capsys: pytest.CaptureFixture[str], *options: str) -> str:
     return capsys.readouterr().out
 
 
-def test_the_page_is_what_the_command_prints(project: Path) -> None:
+def test_the_page_is_what_its_script_writes(project: Path) -> None:
     page = (project / "docs" / "effects.md").read_text(encoding="utf-8")
     named = set(re.findall(r"^### (\S+)$", page, flags=re.M))  # a new effect may wait for the next edition
     assert len(named) > 30
-    assert page == effects_list.markdown(named), "run bemt effects --markdown > docs/effects.md"
+    assert page == effects_page.page(named), "run python docs/effects_page.py"
 
 
 def test_every_effect_is_in_every_form(capsys: pytest.CaptureFixture[str]) -> None:
-    table, page = printed(capsys), printed(capsys, "--markdown")
+    table, page = printed(capsys), effects_page.page()
     document = json.loads(printed(capsys, "--json"))
     assert document["schema"] == "bemt.effects/1"
     by_id = {e["id"]: e for e in document["effects"]}
@@ -500,7 +501,7 @@ def test_every_effect_is_in_every_form(capsys: pytest.CaptureFixture[str]) -> No
 
 @pytest.mark.usefixtures("made_up")
 def test_a_new_file_is_listed_without_another_edit(capsys: pytest.CaptureFixture[str]) -> None:
-    page = printed(capsys, "--markdown")
+    page = effects_page.page()
     assert "### made_up" in page and "* `size` 0.5 (0.25 to 0.75 furlong: nobody" in " ".join(page.split())
     assert "* `form` `round`, `square`" in page
     assert "made up for a test" in printed(capsys)

@@ -226,7 +226,7 @@ def test_menu_leads_to_pages_and_no_panel_is_empty(text: str) -> None:
     ids = [a["id"] for t, a in reader.found if t == "section"]
     menu = [a["href"] for t, a in reader.found if t == "a" and "download" not in a]
     assert {f"#{i}" for i in ids} == set(menu) and len(ids) == len(set(ids))
-    assert "front" in ids and "reproduction" not in ids
+    assert "front" in ids
     for plot in re.findall(r"<figure class=\"plot[^>]*>.*?</figure>", text, re.DOTALL):
         assert re.search(r'<g class="trace" data-t="0"[^>]*>.*<path', plot)
     assert not re.search(r"<h3>[^<]*</h3>\s*(<h3>|</section>)|</h2>\s*</section>", text), (
@@ -464,7 +464,7 @@ def test_like_stands_beside_like_where_the_recording_is_at_another_speed() -> No
     )
     line = Comparison(reference="cfd 5.250 N", source="cfd", S=4.751, D=5.25, u_input=0.4, rpm=6000.0)
     result = Result("one", rows=rows, comparisons=(line,))
-    told = [answer(result), verdict(result)[2], summary(Book("0", (CasePage(result),), (), 0))]
+    told = [answer(result), verdict(result)[2], summary(Book("0", (CasePage(result),), 0))]
     for text in told:
         assert "4.751" in text and "6000" in text and "11.0" not in text and "9000" not in text
     bench = Row("bench", "bench 10 N", 10.0, rpm=9000.0, airspeed_m_s=0.0)
@@ -582,7 +582,7 @@ def test_a_report_of_one_case_made_from_its_label_holds_no_word_of_the_thesis(
 
 
 def test_a_report_of_own_cases_holds_no_word_of_the_thesis(made: tuple[Book, Path], text: str) -> None:
-    assert not made[0].reproduction and "thesis" not in text.lower() and "Cahill" not in text
+    assert "thesis" not in text.lower() and "Cahill" not in text
 
 
 def test_the_head_says_whose_report_it_is(made: tuple[Book, Path]) -> None:
@@ -825,16 +825,3 @@ def test_no_page_is_wider_than_the_window(opened: Browser, width: int) -> None:
     for page, size in opened.run(wide):
         assert size <= width, page
     assert opened.complaints == []
-
-
-def test_three_fidelities_are_those_of_the_cases_shown(tmp_path: Path) -> None:
-    from bemt.tools.cfd.report import fidelities, fidelity_sections
-
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    (folder / "loads.csv").write_text("source,run,case,J,thrust_N\nBEMT,a,mine,0.4,17.6\ndisk,b,mine,0.4,17.5\n")
-    speeds = ["run,z_over_R,r_over_R,axial_speed_m_s", "a,0,0.5,30", "a,0,0.7,31", "b,-2,0.5,35", "b,-2,0.7,36"]
-    (folder / "wake.csv").write_text("\n".join(speeds))
-    assert [title for title, _ in fidelity_sections(fidelities(tmp_path, ["mine"]))] == ["Loads and cost", "Wake"]
-    assert fidelity_sections(fidelities(tmp_path, ["other"])) == []
-    assert fidelity_sections(fidelities(tmp_path / "nowhere", ["mine"])) == []

@@ -148,13 +148,13 @@ def check_choices(choices: Mapping[str, tuple[str, ...]], given: Mapping[str, An
         raise InputError(faults)
 
 
-def did_you_mean(got: str, known: Iterable[str]) -> str:
+def did_you_mean(got: str, known: Iterable[str], most: int = 2) -> str:
     """`` Did you mean X?`` when a known word is near, else nothing.
 
     >>> did_you_mean("swep", ["sweep", "report"]), did_you_mean("x", ["sweep"])
     (' Did you mean sweep?', '')
     """
-    near = difflib.get_close_matches(got, list(known), 2, 0.6)
+    near = difflib.get_close_matches(got, list(known), most, 0.6)
     return f" Did you mean {' or '.join(near)}?" if near else ""
 
 

@@ -8,7 +8,6 @@ hint, never converted.
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -34,6 +33,7 @@ from pydantic import (
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, core_schema
 
+from bemt.base.action import did_you_mean
 from bemt.base.errors import InputError
 from bemt.base.toml_text import Collector, load_toml, unit_hint
 
@@ -242,10 +242,6 @@ def shown(value: Any) -> str:
     return f"{value:.10g}" if isinstance(value, float) else str(value)
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
-
-
 def _hint(where: str, value: Any, kind: Any, limits: FieldLimits) -> str:
     """How to repair a value that is not what its field holds."""
     parts, name = _parts(kind), where.rpartition(".")[2]
@@ -253,7 +249,7 @@ def _hint(where: str, value: Any, kind: Any, limits: FieldLimits) -> str:
         return _text_hint(name, value, parts, limits)
     if isinstance(value, Mapping) and next(_models(parts[0]), None) and get_origin(parts[0]) is tuple:
         return f"Write [[{name}]] with two brackets"
-    if not _is_number(value) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
         return ""
     if Span in parts:
         return f"Write [{shown(value)}]"
@@ -269,7 +265,7 @@ def _hint(where: str, value: Any, kind: Any, limits: FieldLimits) -> str:
 
 def _text_hint(name: str, value: str, parts: Sequence[Any], limits: FieldLimits) -> str:
     if choices := limits.choices or next((get_args(k) for k in parts if get_origin(k) is Literal), ()):
-        return (limits.suspect(value) if limits.suspect else "") or _did_you_mean(value, choices)
+        return (limits.suspect(value) if limits.suspect else "") or did_you_mean(value, choices, 1).strip()
     if not {int, float} & set(parts):
         return ""
     told = unit_hint(name, value)
@@ -285,11 +281,6 @@ def _quoted_number(value: str) -> bool:
         return math.isfinite(float(value))
     except ValueError:
         return False
-
-
-def _did_you_mean(word: str, known: Iterable[str]) -> str:
-    close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
-    return f"Did you mean {close[0]}?" if close else ""
 
 
 def _refusal(where: str, got: str, expected: str, hint: str = "") -> PydanticCustomError:
@@ -456,4 +447,4 @@ def _stray_hint(name: str, owner: type[Table], root: type[Table]) -> str:
     if homes and owner in tables.values() and not name.startswith("_"):
         home = f"[{homes[0]}]" if homes[0] else "the top of the file"
         return f"{name} belongs in {home}"
-    return _did_you_mean(name, keys) or _did_you_mean(name, owner.named())
+    return (did_you_mean(name, keys, 1) or did_you_mean(name, owner.named(), 1)).strip()

@@ -154,13 +154,8 @@ def report(
 
 
 @action("Models and checks", "effects")
-def effects(*, markdown: bool = False) -> Told:
+def effects() -> Told:
     """List every effect: parameters, ranges, sources, signature.
-
-    Parameters
-    ----------
-    markdown : bool
-        As the page docs/effects.md.
 
     Returns
     -------
@@ -174,4 +169,4 @@ def effects(*, markdown: bool = False) -> Told:
     """
     from bemt.results.report import effects_list
 
-    return Told(effects_list.document(), effects_list.markdown() if markdown else effects_list.text())
+    return Told(effects_list.document(), effects_list.text())

@@ -22,8 +22,9 @@ import io
 import math
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -74,6 +75,7 @@ class Reference:
     density_kg_m3: float = math.nan
     where: str = ""  # ``file:line``
     sha256: str = field(default="", repr=False)  # Hash of the file
+    setup: Mapping[str, Any] = field(default_factory=dict, repr=False)  # Conditions of a CFD run, by name
 
     @property
     def condition(self) -> tuple[float | None, float | None, float | None]:
@@ -184,7 +186,7 @@ def _reference(row: _Row) -> Reference | None:
         quantity, value * factor, u * factor, QUANTITIES[quantity][1], kind, source, remark,
         f"{text} {unit}".removesuffix(" -"), where=f"{row.source.name}:{row.line}",
         sha256=row.source.sha256,
-        **conditions,
+        **conditions,  # type: ignore[arg-type]
     )  # fmt: skip
 
 

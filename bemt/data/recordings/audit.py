@@ -26,7 +26,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from numbers import Real
+from typing import Any
 
 from bemt.base.document import Documented
 from bemt.physics.k1k2 import ZERO_THRUST_MEASURED
@@ -289,38 +291,53 @@ _PHRASES: tuple[tuple[str, Mapping[str, float | bool | str]], ...] = (
     (r"\bautomatic wall functions?\b", {"wall": "automatic"}),
     (r"\bat (one|a single) node\b", {"thrust_from": "node"}),
     (r"\bforces integrated\b|\bintegrated over the blades\b", {"thrust_from": "forces"}),
-    (r"\brotating (cell )?(zone|frame)\b|\bMRF\b|\bfrozen rotor\b", {"steady_mrf": True}),
-    (r"\bsliding mesh\b", {"steady_mrf": False}),
+    (r"\brotating (cell )?(zone|frame)\b|\bMRF\b|\bfrozen rotor\b", {"steady": True}),
+    (r"\bsliding mesh\b", {"steady": False}),
     (r"\brealizable k-epsilon\b", {"turbulence": "realizable k-epsilon"}),
     (r"\bk-omega SST\b", {"turbulence": "k-omega SST"}),
 )
 """Words of a remark and what they state."""
-_NUMBER = r"([0-9]*\.?[0-9]+)"
-_NUMBERS: tuple[tuple[str, str, float], ...] = (
-    (rf"\bdomain {_NUMBER} D\b", "domain_over_D", 1.0),
-    (rf"\by\+ {_NUMBER}", "y_plus", 1.0),
-    (rf"\bu_grid {_NUMBER} ?%", "u_grid", 0.01),
-    (rf"\bGCI {_NUMBER} ?%", "u_grid", 0.01 / 1.15),
-    (rf"\bdrift {_NUMBER} ?%", "drift", 0.01),
-    (rf"\bskew {_NUMBER} deg\b", "skew_deg", 1.0),
-    (rf"\bmass balance {_NUMBER} ?%", "mass_balance", 0.01),
-    (rf"\bmomentum balance {_NUMBER} ?%", "momentum_balance", 0.01),
-    (rf"\b{_NUMBER} cells\b", "cells", 1.0),
-)
 
 
-def facts_from_remark(remark: str, known: CfdFacts | None = None) -> CfdFacts:
-    """Read set phrases of a remark in ``references.csv``; other words say nothing.
+def setup_in(remark: str) -> dict[str, float | bool | str]:
+    """Conditions that set phrases of a remark in ``references.csv`` state; other words say nothing.
 
-    >>> f = facts_from_remark("MRF; k-omega SST with automatic wall functions; domain 5 D, y+ 51, GCI 2.3 %")
-    >>> f.steady_mrf, f.wall, f.domain_over_D, f.y_plus, f.u_grid, f.compressible
-    (True, 'automatic', 5.0, 51.0, 0.02, None)
+    >>> setup_in("MRF; k-omega SST with automatic wall functions")
+    {'wall': 'automatic', 'steady': True, 'turbulence': 'k-omega SST'}
     """
-    found: dict[str, float | bool | str] = {}
-    for pattern, values in _PHRASES:
-        if re.search(pattern, remark, re.IGNORECASE):
-            found |= values
-    for pattern, name, factor in _NUMBERS:
-        if match := re.search(pattern, remark, re.IGNORECASE):
-            found[name] = float(f"{float(match[1]) * factor:.12g}")
-    return replace(known or CfdFacts(), **found)  # type: ignore[arg-type]
+    return {k: v for pattern, told in _PHRASES if re.search(pattern, remark, re.IGNORECASE) for k, v in told.items()}
+
+
+_WALLS = {"kOmegaSST": "k-omega SST", "realizableKE": "realizable k-epsilon"}
+_FAR = {"free": 5.0, "pipe": 1.0}  # Domain of our own campaigns over the disk, diameters [1] (reports/cfd)
+
+
+def facts_of(get: Callable[[str], Any], own: bool, **flow: float) -> CfdFacts:
+    """Facts of a run, of our campaigns (`own`) or anybody's, by what it states; `flow` M_tip, J, CT and the rotor's.
+
+    `get` gives a condition or a number by its name, None where it is not stated.
+    """
+    names = ("solver", "domain_over_D", "turbulence", "compressible")
+    solver, domain, turbulence, compressible = map(get, names)
+    if compressible is None and isinstance(solver, str):
+        compressible = {"compressible": True, "incompressible": False}.get(solver)
+    return CfdFacts(
+        domain_over_D=number_or(domain) if domain is not None else _FAR.get(str(get("domain")), math.nan),
+        compressible=None if compressible is None else bool(compressible),
+        grids=_whole(get("grids"), 0 if own else None), u_grid=number_or(get("u_grid")), cells=number_or(get("cells")),
+        drift=number_or(get("drift_thrust")), wall=str(get("wall") or ("function" if own else "")),
+        y_plus=number_or(get("y_plus"), number_or(get("yplus_avg"))),
+        turbulence=_WALLS.get(str(turbulence), str(turbulence or "")),
+        thrust_from="forces" if own else str(get("thrust_from") or ""), steady_mrf=True if own else get("steady"),
+        skew_deg=number_or(get("sideslip_deg"), 0.0), mass_balance=number_or(get("balance_mass")),
+        momentum_balance=number_or(get("balance_momentum")), **flow,  # type: ignore[arg-type]
+    )  # fmt: skip
+
+
+def number_or(value: Any, other: float = math.nan) -> float:
+    """A finite number, else the other."""
+    return float(value) if isinstance(value, Real) and math.isfinite(value) else other
+
+
+def _whole(value: Any, other: int | None) -> int | None:
+    return int(value) if isinstance(value, (int, float)) and math.isfinite(value) else other

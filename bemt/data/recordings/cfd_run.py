@@ -23,7 +23,7 @@ from bemt.data.readers.cfd_run import RunToml
 from bemt.data.readers.headings import channel_of
 from bemt.data.recordings.cfd_files import EXPORT, PROGRAMS, Settled, cfd_files, clock_of, read_run, settled, zone_of
 from bemt.data.recordings.cfd_loads import CHANNEL, OpenRun, by_zone, columns_of, counted_zones, other_than_loads
-from bemt.data.recordings.cfd_setup import CfdRun, with_grid_floor
+from bemt.data.recordings.cfd_setup import CfdRun, conditions_text, with_grid_floor
 from bemt.data.recordings.channels import moves
 from bemt.data.recordings.check import check
 from bemt.data.recordings.grid_study import CELL_SIZE, COVERAGE, by_grid, groups, together
@@ -356,7 +356,7 @@ def _with_u(x: float, u: float) -> str:
 
 def run_text(d: CfdRun) -> str:
     """A run for a terminal: points with u, what was averaged, what was decided."""
-    averaged, drifts, set_up = d.averaged, d.drift, d.conditions
+    averaged, drifts = d.averaged, d.drift
     names = [k for k in _SHOWN if k in d]
     rows = [[_with_u(d[k][i], d.u[k][i]) for k in names] for i in range(len(d))]
     lines = [f"one run: {', '.join(Path(f).name for f in d.files)}"]
@@ -365,9 +365,4 @@ def run_text(d: CfdRun) -> str:
         own = [k.rsplit("_", 1)[0] for k, v in averaged.items() if v == over]
         drift = ", ".join(f"{k.rsplit('_', 1)[0]} {v:+.2%}" for k, v in drifts.items() if averaged.get(k) == over)
         lines.append(f"  {', '.join(own)}: {over}" + (f"; drift {drift}" if drift else ""))
-    words = [
-        f"{k.replace('_', ' ')} {'yes' if v is True else 'no' if v is False else f'{v:,.0f}' if k == 'cells' else v}"
-        for k, v in set_up.items()
-        if k not in ("thrust_from", "drift_thrust", "u_grid")
-    ]
-    return "\n".join([*lines, f"  set-up: {', '.join(words)}", *(f"  ! {note}" for note in d.notes)])
+    return "\n".join([*lines, f"  set-up: {conditions_text(d.conditions)}", *(f"  ! {note}" for note in d.notes)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from bemt.base.tables import number_text
 from bemt.data.readers.references import Reference
-from bemt.data.recordings.audit import AuditLine, CfdFacts, audit
+from bemt.data.recordings.audit import AuditLine, audit, facts_of, number_or
 from bemt.physics.dataset import Dataset
 
 if TYPE_CHECKING:
@@ -201,10 +201,6 @@ def grid_that_differs(a: Dataset, b: Dataset) -> str:
     return "the grid differs: " + "; ".join(f"{words[k]} {one} and {two}" for k, (one, two) in differ.items())
 
 
-_WALLS = {"kOmegaSST": "k-omega SST", "realizableKE": "realizable k-epsilon"}
-_FAR = {"free": 5.0, "pipe": 1.0}  # Domain of our own campaigns over the disk, diameters [1] (reports/cfd)
-
-
 def _one(d: Dataset, name: str, row: int) -> Any:
     """A condition of one row, by any of its names; None where it is not stated."""
     for key in (name, *(k for k, v in _ALIAS.items() if v == name)):
@@ -218,62 +214,34 @@ def _one(d: Dataset, name: str, row: int) -> Any:
 def audit_of(
     d: Dataset, diameter_m: float, pitch_m: float, ducted: bool, a_sound: float, row: int = 0
 ) -> tuple[AuditLine, ...]:
-    """Audit of one row of a CFD recording: a run of anybody, or a campaign of our own."""
+    """Audit of one row of a CFD recording."""
 
     def get(name: str) -> Any:
         return _one(d, name, row)
 
-    rpm = float(d.rpm[row]) if "rpm" in d else math.nan
-    n, V = rpm / 60.0, _number(get("airspeed_m_s"), 0.0)
-    thrust, rho = _number(get("thrust_N")), _number(get("density_kg_m3"), 1.225)
-    solver, own = get("solver"), "balance_mass" in d
-    compressible = get("compressible")
-    if compressible is None and isinstance(solver, str):
-        compressible = {"compressible": True, "incompressible": False}.get(solver)
-    domain = get("domain_over_D")
-    turbulence = str(get("turbulence") or "")
-    facts = CfdFacts(
-        M_tip=math.pi * n * diameter_m / a_sound, J=V / (n * diameter_m) if n > 0 else 0.0,
-        pitch_over_D=pitch_m / diameter_m, CT=thrust / (rho * n**2 * diameter_m**4) if n > 0 else math.nan,
-        domain_over_D=_number(domain) if domain is not None else _FAR.get(str(get("domain")), math.nan),
-        compressible=None if compressible is None else bool(compressible),
-        grids=_whole(get("grids"), 0 if own else None), u_grid=_number(get("u_grid")), cells=_number(get("cells")),
-        drift=_number(get("drift_thrust")), wall=str(get("wall") or ("function" if own else "")),
-        y_plus=_number(get("y_plus"), _number(get("yplus_avg"))), turbulence=_WALLS.get(turbulence, turbulence),
-        thrust_from="forces" if own or get("thrust_from") == "forces" else "",
-        steady_mrf=True if own else get("steady"), skew_deg=_number(get("sideslip_deg"), 0.0),
-        mass_balance=_number(get("balance_mass")), momentum_balance=_number(get("balance_momentum")), ducted=ducted,
-    )  # fmt: skip
-    return audit(facts)
+    n, V = (float(d.rpm[row]) if "rpm" in d else math.nan) / 60.0, number_or(get("airspeed_m_s"), 0.0)
+    thrust, rho = number_or(get("thrust_N")), number_or(get("density_kg_m3"), 1.225)
+    return audit(facts_of(
+        get, "balance_mass" in d, M_tip=math.pi * n * diameter_m / a_sound, J=V / (n * diameter_m) if n > 0 else 0.0,
+        CT=thrust / (rho * n**2 * diameter_m**4) if n > 0 else math.nan, pitch_over_D=pitch_m / diameter_m,
+        ducted=ducted,
+    ))  # fmt: skip
 
 
-_REMARK: Mapping[str, Callable[[Any], str | None]] = {
-    "program": str, "steady": {True: "MRF", False: "sliding mesh"}.get, "turbulence": str,
-    "wall": {"function": "wall functions", "scalable": "scalable wall functions",
-             "automatic": "automatic wall functions"}.get,
-    "compressible": {True: "compressible", False: "incompressible"}.get, "domain_over_D": "domain {:g} D".format,
-    "y_plus": "y+ {:g}".format, "cells": "{:.0f} cells".format,
-    "grids": lambda number: "no grid study" if number < 2 else None,
-    "u_grid": lambda u: f"u_grid {100.0 * u:.3g} %", "drift_thrust": lambda drift: f"drift {100.0 * abs(drift):.3g} %",
-    "thrust_from": lambda word: "forces integrated" if word == "forces" else None,
-}  # fmt: skip
+def conditions_text(conditions: Mapping[str, Any]) -> str:
+    """Conditions of a run in words.
 
-
-def remark_of(conditions: Mapping[str, Any]) -> str:
-    """Set-up of a run in the set phrases that the audit of references reads.
-
-    >>> remark_of({"steady": True, "turbulence": "k-omega SST", "cells": 2e6, "drift_thrust": 0.004})
-    'MRF; k-omega SST; 2000000 cells; drift 0.4 %; forces integrated'
+    >>> conditions_text({"steady": True, "turbulence": "k-omega SST", "cells": 2e6})
+    'steady yes, turbulence k-omega SST, cells 2,000,000'
     """
-    stated = {"thrust_from": "forces", **conditions}
-    names = (name for name in _REMARK if stated.get(name) is not None and not (name == "grids" and "u_grid" in stated))
-    return "; ".join(words for name in names if (words := _REMARK[name](stated[name])))
+    shown = {k: v for k, v in conditions.items() if k not in ("thrust_from", "drift_thrust", "u_grid")}
+    return ", ".join(f"{k.replace('_', ' ')} {_text(v)}" for k, v in shown.items())
 
 
 def references_of(run: Dataset, where: str) -> list[Reference]:
     """Points of a run as recorded values of a case: thrust, torque, the duct's part."""
     out = []
-    remark = remark_of(stated_of(run))
+    setup = {"thrust_from": "forces", **stated_of(run)}
     loads = (("thrust", "thrust_N", "N"), ("torque", "torque_Nm", "N m"), ("duct_thrust", "duct_thrust_N", "N"))
     sha256 = str(run.provenance.get("sha256", ""))
     for quantity, channel, unit in (*loads, ("CT", "CT", "-"), ("CQ", "CQ", "-")):
@@ -283,18 +251,10 @@ def references_of(run: Dataset, where: str) -> list[Reference]:
                 continue
             state = {k: float(run[k][i]) for k in ("rpm", "airspeed_m_s", "density_kg_m3") if k in run}
             out.append(Reference(
-                quantity, value, float(run.u[channel][i]), channel, "cfd", run.name, remark,
-                f"{number_text(value, 4)} {unit}", where=f"{where}:{i + 1}", sha256=sha256, **state,
+                quantity, value, float(run.u[channel][i]), channel, "cfd", run.name, conditions_text(setup),
+                f"{number_text(value, 4)} {unit}", where=f"{where}:{i + 1}", sha256=sha256, setup=setup, **state,
             ))  # fmt: skip
     return out
-
-
-def _number(value: Any, other: float = math.nan) -> float:
-    return float(value) if isinstance(value, (int, float, np.floating)) and math.isfinite(value) else other
-
-
-def _whole(value: Any, other: int | None) -> int | None:
-    return int(value) if isinstance(value, (int, float)) and math.isfinite(value) else other
 
 
 def faults_first(lines: Iterable[AuditLine]) -> list[AuditLine]:

@@ -118,7 +118,7 @@ def constant(facts: Facts) -> Iterator[Finding]:
 @check_for("misread")
 def misread(facts: Facts) -> Iterator[Finding]:
     """A single load of a table of points at rest that lies far off the curve of the others."""
-    rpm = facts.get("rpm")
+    rpm = facts.rpm
     states = ("wall_distance_m", "tip_gap_m", "second_rotor_rad_s", "density_kg_m3", "pressure_Pa")
     if rpm is None or facts.bare or "time_s" in facts.values or not facts.still.all():
         return
@@ -145,7 +145,7 @@ def units_within(facts: Facts) -> Iterator[Finding]:
 
     A wrong speed moves every load: where electrical power over the cube of the speed jumps the same way, it is that.
     """
-    rpm = facts.get("rpm")
+    rpm = facts.rpm
     if rpm is None or facts.bare:
         return
     electric = facts.filled.get("electrical_power_W")
@@ -183,7 +183,7 @@ def units_within(facts: Facts) -> Iterator[Finding]:
 @check_for("time")
 def time_backwards(facts: Facts) -> Iterator[Finding]:
     """Time that falls."""
-    t = facts.get("time_s")
+    t = facts.time_s
     if t is None:
         return
     rows = np.flatnonzero(np.isfinite(t))
@@ -213,7 +213,7 @@ def slow_rotor(facts: Facts) -> Iterator[Finding]:
     Rows far apart alone say nothing, since points written down by hand are. But one that took the new speed is there
     by the next row; none needs more than `SLOWEST_S`, whatever its size.
     """
-    t, told, command = facts.get("time_s"), facts.first("rpm", "thrust_N"), facts.first("pwm_s", "throttle")
+    t, told, command = facts.time_s, facts.first("rpm", "thrust_N"), facts.first("pwm_s", "throttle")
     if t is None or command is None or told is None:
         return
     response, (_, c), y = told[0], command, told[1]
@@ -327,7 +327,7 @@ def flipped(facts: Facts) -> Iterator[Finding]:
 
 def _wind(facts: Facts) -> float | None:
     """Speed of no thrust, as in a wind that is not recorded [rev/min]; None: no such wind."""
-    rpm, thrust = facts.get("rpm"), facts.get("thrust_N")
+    rpm, thrust = facts.rpm, facts.thrust_N
     if rpm is None or thrust is None:
         return None
     return zero_thrust_speed(rpm[facts.still], thrust[facts.still])
@@ -335,7 +335,7 @@ def _wind(facts: Facts) -> float | None:
 
 def _mirrored(facts: Facts, name: str, v: Array, loaded: NDArray[np.bool_], sign: float) -> NDArray[np.bool_]:
     """Rows of the other sign whose magnitude is what the speed of the row needs."""
-    rpm = facts.get("rpm")
+    rpm = facts.rpm
     scaled = np.abs(v)
     if rpm is not None and name in ("thrust_N", "torque_Nm", "power_W"):
         with np.errstate(all="ignore"):
@@ -351,13 +351,13 @@ def _mirrored(facts: Facts, name: str, v: Array, loaded: NDArray[np.bool_], sign
 @check_for("negative_thrust")
 def negative_thrust(facts: Facts) -> Iterator[Finding]:
     """Thrust below zero at rest of the air, in rows of a channel that is positive elsewhere."""
-    v = facts.get("thrust_N")
+    v = facts.thrust_N
     if v is None or facts.bare:
         return
     top = float(np.nanpercentile(v, 95))
     if top <= 0.0 or np.mean(np.nan_to_num(v) < 0.0) > 0.5:
         return
-    rpm, zero = facts.get("rpm"), _wind(facts)
+    rpm, zero = facts.rpm, _wind(facts)
     if zero is not None:
         text = f"thrust grows with the speed and changes its sign at {zero:.0f} rev/min: a propeller in wind does that"
         fix = "state the airspeed: --airspeed-m-s V in diagnose, --air-a V or --air-b V in compare"
@@ -382,7 +382,7 @@ def power_above_input(facts: Facts) -> Iterator[Finding]:
         return
     shaft, words = shaft_power(facts.filled), "torque x speed"
     if shaft is None or not np.any(np.isfinite(shaft[facts.loaded])):
-        shaft, words = facts.get("power_W"), facts.named("power_W")
+        shaft, words = facts.power_W, facts.named("power_W")
     if shaft is None:
         return
     with np.errstate(all="ignore"):
@@ -400,19 +400,17 @@ def power_above_input(facts: Facts) -> Iterator[Finding]:
 def merit_above_one(facts: Facts) -> Iterator[Finding]:
     """A rotor in still air that needs less power than the ideal one (Froude; with a duct, an ideal one of 1.3 area)."""
     limit, words = (math.sqrt(2.0 * 1.3), "a ducted one") if facts.ducted else (1.0, "an open one")
-    ct, cp = facts.get("CT"), facts.get("CP")
+    ct, cp = facts.CT, facts.CP
     T, D = facts.filled.get("thrust_N"), facts.diameter_m
     shaft = shaft_power(facts.filled)
     if shaft is None:
-        shaft = facts.get("power_W")
+        shaft = facts.power_W
     with np.errstate(all="ignore"):
         if T is not None and D is not None and D > 0.0 and shaft is not None:
             P = np.abs(shaft)
             area = math.pi / 4.0 * D * D
             fm = np.where((T > 0) & (P > 0), T**1.5 / (P * np.sqrt(2.0 * facts.rho * area)), np.nan)
-        elif (
-            ct is not None and cp is not None and (facts.get("J") is not None or facts.get("airspeed_m_s") is not None)
-        ):
+        elif ct is not None and cp is not None and (facts.J is not None or facts.airspeed_m_s is not None):
             fm = np.where((ct > 0) & (cp > 0), np.asarray(co.FM(ct, cp), dtype=float), np.nan)
         else:
             return
@@ -429,7 +427,7 @@ def merit_above_one(facts: Facts) -> Iterator[Finding]:
 @check_for("tip_mach")
 def tip_mach(facts: Facts) -> Iterator[Finding]:
     """Tip speed above Mach 1.1."""
-    rpm, D = facts.get("rpm"), facts.diameter_m
+    rpm, D = facts.rpm, facts.diameter_m
     if rpm is None or D is None:
         return
     mach = math.pi * D * np.abs(np.nan_to_num(rpm)) / 60.0 / 343.0

@@ -39,6 +39,16 @@ class Finding:
         return f"{self.severity}: {self.id} ({self.channel}): {self.evidence}. Correction: {self.correction}"
 
 
+class _Channel:
+    """A channel by its usual name, as an attribute; None without a finite value."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, facts: Facts, owner: type[Facts]) -> Array | None:
+        return facts.get(self._name)
+
+
 @dataclass(frozen=True, eq=False)
 class Facts:
     """What the checks look at; every array has one entry per row."""
@@ -55,6 +65,9 @@ class Facts:
     ducted: bool = False  # Rotor in a duct
     bare: bool = False  # Recorded without a propeller: nothing is expected of its loads
     settled: bool = False  # Rows are means of computed flows: one is enough
+
+    time_s, rpm, optical_rpm, electrical_rpm = _Channel(), _Channel(), _Channel(), _Channel()
+    thrust_N, power_W, CT, CP, J, airspeed_m_s = (_Channel() for _ in range(6))
 
     def __len__(self) -> int:
         """Give the number of rows."""
@@ -78,6 +91,11 @@ class Facts:
         """Density, a usual one where none is recorded. [kg/m3]"""
         v = self.values.get("density_kg_m3", np.full(len(self), np.nan))
         return np.where((v > 0.2) & (v < 2.0), v, LIKELY_RHO)
+
+    @property
+    def power_by_product(self) -> bool:
+        """Whether the electrical power was made of voltage and current."""
+        return self.named("electrical_power_W") == "voltage_V x current_A"
 
     def sampled(self) -> Facts:
         """Every nth row of a long log: medians need no more."""
@@ -113,7 +131,7 @@ class Facts:
                 size = np.abs(np.nan_to_num(v))
                 out &= size >= 0.2 * float(np.percentile(size[size > 0.0], 95))
                 break
-        speed = self.get("rpm")
+        speed = self.rpm
         if speed is not None and np.any(np.nan_to_num(speed) != 0.0):
             out &= np.nan_to_num(speed) != 0.0
         return out

@@ -120,7 +120,7 @@ def _quantities(facts: Facts) -> dict[str, Array]:
     q = {key: np.abs(facts.filled[name]) for key, name in _QUANTITY.items() if facts.get(name) is not None}
     if "n" in q:
         q["n"] = q["n"] / 60.0
-    if facts.names.get("electrical_power_W") == "voltage_V x current_A":
+    if facts.power_by_product:
         q.pop("E", None)
     if "E" not in q and {"U", "I"} <= q.keys():
         q["E"] = q["U"] * q["I"]
@@ -132,7 +132,7 @@ def _quantities(facts: Facts) -> dict[str, Array]:
     for key, length in (("D", facts.diameter_m), ("p", facts.pitch_m)):
         if length is not None and length > 0.0:
             q[key] = np.full(n, length)
-    optical, electrical = facts.get("optical_rpm"), facts.get("electrical_rpm")
+    optical, electrical = facts.optical_rpm, facts.electrical_rpm
     if optical is not None and electrical is not None:
         q["n2"] = np.abs(electrical if facts.named("rpm") == "optical_rpm" else optical) / 60.0
     return {k: np.where(v > 0.0, v, np.nan) for k, v in q.items()}
@@ -145,7 +145,7 @@ def relations(facts: Facts) -> list[Relation]:
     rho = facts.rho
     duct = facts.ducted
     still = facts.loaded & facts.still
-    product = facts.names.get("electrical_power_W") == "voltage_V x current_A"  # E is U I then, by construction
+    product = facts.power_by_product  # E is U I then, by construction
     electric = {"U": 1.0, "I": 1.0} if product else {"E": 1.0}
 
     def add(name: str, powers: Mapping[str, float], scale: Array | float, bounds: tuple[float, float],

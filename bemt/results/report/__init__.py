@@ -25,7 +25,7 @@ HTML_NAME, MARKDOWN_NAME = "report.html", "report.md"
 def _pages(book: Book) -> Iterator[Page]:
     """Pages in the order of the menu."""
     from bemt.results.report.book import Page, sections
-    from bemt.results.report.case_page import case_sections, reproduction_table
+    from bemt.results.report.case_page import case_sections
     from bemt.results.report.diagnosis_block import diagnosis_parts, headline, page_verdict
     from bemt.results.report.front import answers, front_parts
 
@@ -34,19 +34,9 @@ def _pages(book: Book) -> Iterator[Page]:
     yield Page("front", "Answers", "Answers", front_parts(book, ids), [], answers(book, ids))
     for case, name, key in zip(book.cases, names, ids, strict=True):
         said = "verdict", page_verdict(case)
-        yield Page(key, name[:40], headline(case.result), [said], case_sections(case, book.reproduction))
-    given = [item for item in book.reproduction if item.status.startswith("input")]
-    numbers = reproduction_table([item for item in book.reproduction if item not in given])
-    inputs = f"{len(given)} inputs, not computed", [("table", reproduction_table(given))]
-    thesis = (
-        "T. Cahill, MS thesis, Northeastern University, April 2025. Statistics of the UIUC database are checked by "
-        "reports/studies/reproduce.py where those data are."
-    )
+        yield Page(key, name[:40], headline(case.result), [said], case_sections(case))
     told = sections(*((item.name, diagnosis_parts(item)) for item in book.diagnoses))
     yield from (p for p in (*book.tools, Page("diagnoses", "Diagnoses", "Diagnoses", [], told)) if p.sections)
-    if numbers:
-        top = [("words", thesis), ("table", numbers), ("more", inputs)]
-        yield Page("reproduction", "Reproduction", "Every number of the source thesis", top, [])
 
 
 def book_html(book: Book) -> str:

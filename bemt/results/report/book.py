@@ -1,4 +1,4 @@
-"""What a report shows, typed: cases with their curves, numbers of the source thesis, diagnoses, pages of tools.
+"""What a report shows, typed: cases with their curves, diagnoses, pages of tools.
 
 Arrays are along the abscissa that stands first; NaN where nothing is known.
 """
@@ -221,18 +221,6 @@ class CasePage:
     diagnosis: Diagnosed | None = None
 
 
-class Reproduced(Documented):
-    """A number of the source thesis beside ours."""
-
-    section: str
-    quantity: str
-    stated: Any  # As printed, number or words
-    ours: Any
-    unit: str
-    status: str
-    note: str
-
-
 class About(Documented):
     """Head of the page, as far as wanted."""
 
@@ -248,7 +236,6 @@ class Book:
 
     version: str
     cases: tuple[CasePage, ...]
-    reproduction: Sequence[Reproduced]
     exit_code: int
     tools: tuple[Page, ...] = ()
     diagnoses: tuple[Diagnosed, ...] = ()

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from bemt.base.page import Cell, PageTable, num, table
+from bemt.base.page import Cell, num, table
 from bemt.base.tables import number_text
 from bemt.physics import coefficients as co
-from bemt.results.report.book import Beside, CasePage, Reproduced, Section, sections, uri
+from bemt.results.report.book import Beside, CasePage, Section, sections, uri
 from bemt.results.report.diagnosis_block import (
     audit_parts,
     diagnosis_parts,
@@ -126,7 +126,7 @@ def _performance(page: CasePage) -> Section:
         most = None
         if name == "eta":  # of the least thrust in the band, as the limit falls with thrust
             most = co.eta_limit(j.J, 0.0 if result.fan else j.CT - j.u["CT"])
-        traces = [Trace("BEMT", j.J, y, j.u[name], COLOURS["bemt"], ceiling=most)]
+        traces = [Trace("BEMT", j.J, y, j.u[name], ceiling=most)]
         if name == "CT":
             traces.append(Trace("K1/K2", j.J, c.k1k2_CT, None, COLOURS["k1k2"], "7 4"))
         if name != "eta":
@@ -143,7 +143,7 @@ def _performance(page: CasePage) -> Section:
         ("Thrust per shaft power", "thrust per power [N/kW]", per_kW, None, [], ""),
     ):
         seen = _points(page, "rpm", channel, lambda r: near(r.airspeed_m_s, own.airspeed_m_s)) if channel else []
-        traces = [Trace("BEMT", w.rpm, y, u, COLOURS["bemt"]), *more, *seen]
+        traces = [Trace("BEMT", w.rpm, y, u), *more, *seen]
         title = f"{title} at {own.airspeed_m_s:g} m/s"
         plots.append(Plot(title, "rotational speed [rev/min]", label, traces, x_zero=True))
     words = (
@@ -202,10 +202,9 @@ def _verification(page: CasePage) -> Section:
     v = page.refinement
     if v is None:
         return "", []
-    line = Trace("BEMT", v.stations, v.thrust_N, colour=COLOURS["bemt"])
-    plot = figure(
-        Plot("Thrust against blade elements", "blade elements [-]", "thrust [N]", [line], log_x=True, zero=False)
-    )
+    line = Trace("BEMT", v.stations, v.thrust_N)
+    title = "Thrust against blade elements"
+    plot = figure(Plot(title, "blade elements [-]", "thrust [N]", [line], log_x=True, zero=False))
     solved = zip(v.stations, v.thrust_N.tolist(), v.torque_Nm.tolist(), strict=True)
     rows = [[num(n), num(T, 7), num(Q, 6)] for n, T, Q in solved]
     words, study = [], v.grid_study
@@ -249,35 +248,6 @@ def _quantity(c: Comparison) -> str:
     return f"{name.replace('_', ' ')} [{c.unit}]"
 
 
-def reproduction_table(items: Sequence[Reproduced]) -> PageTable | None:
-    """Make the table of numbers of the thesis beside ours."""
-    rows = []
-    for item in items:
-        status = item.status
-        kind = "fault" if status.startswith("not reproduced") else "unknown" if "input" in status else "fine"
-        ours = item.ours
-        shown = num(ours, 5) if isinstance(ours, int | float) else Cell("" if ours is None else str(ours))
-        try:
-            stated = Cell(str(item.stated), num(float(item.stated)).value, True)
-        except ValueError:
-            stated = Cell(str(item.stated))
-        words = Cell(status.removesuffix(", because"), badge=kind)
-        rows.append([item.quantity, stated, shown, item.unit, words, item.note])
-    return table(["quantity", "stated", "ours", "unit", "status", "note"], rows)
-
-
-def _of_case(items: Sequence[Reproduced], name: str) -> list[Reproduced]:
-    """Items that name the case: its last word before a colon, or its name in the heading of their section."""
-    last = name.rpartition("_")[2].lower()
-    flat = "".join(c for c in name.lower() if c.isalnum())
-
-    def about(item: Reproduced) -> bool:
-        head = "".join(c for c in item.section.lower() if c.isalnum())
-        return item.quantity.lower().startswith(last + ":") or (len(flat) > 3 and flat in head)
-
-    return [item for item in items if about(item)]
-
-
 def _limits(page: CasePage) -> Section:
     result = page.result
     flags: dict[str, None] = {}
@@ -294,19 +264,17 @@ def _limits(page: CasePage) -> Section:
     return "Limits", [("list", [*flags, *result.notes, *page.problems, *general])]
 
 
-def case_sections(page: CasePage, reproduction: Sequence[Reproduced]) -> list[Section]:
+def case_sections(page: CasePage) -> list[Section]:
     """Give the sections of one case."""
     result = page.result
     if not result.rows:
         return sections(("Faults", [("list", result.faults)]))
     audits = [part for audit in result.audit for part in audit_parts(audit)]
     told = page.diagnosis
-    items = reproduction_table(_of_case(reproduction, result.name))
     return sections(
         ("Your recording and the prediction", [("figures", first_pictures(told))] if told else []),
         _validation(result), _geometry(page), _performance(page), _radial(page), _fan(result.fan),
         ("Grids of the CFD", study_parts(result.grid_studies)), ("Audit of the CFD", audits), _verification(page),
         ("Diagnosis: what the model leaves out", diagnosis_parts(told, first=False) if told else []),
         _inputs(page), _limits(page),
-        ("Reproduction of the thesis", [("more", ("Its numbers for this case", [("table", items)]))] if items else []),
     )  # fmt: skip

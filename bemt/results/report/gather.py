@@ -16,7 +16,6 @@ import numpy as np
 import bemt
 from bemt.base import plugins
 from bemt.base.arrays import Array
-from bemt.base.document import rows_of
 from bemt.base.errors import Fault, InputError
 from bemt.base.page import FIRST
 from bemt.base.tables import json_text, number_of, write_atomic
@@ -28,7 +27,6 @@ from bemt.results.report.book import (
     Diagnosed,
     RadialCurves,
     Refinement,
-    Reproduced,
     ShownDiagnosis,
 )
 from bemt.results.report.plot import still
@@ -161,8 +159,6 @@ def refinement(case: Case) -> Refinement:
 
 
 Progress = Callable[[str], None]
-ORIGIN = "Cahill 2025"
-"""What a case of the source thesis states as its ``origin``."""
 SCHEMAS = ("bemt.diagnosis/", "bemt.run-comparison/")
 """What a page shows: a diagnosis, or a recording of too few readings for one beside the model."""
 ALL_BYTES = 4_000_000
@@ -179,8 +175,7 @@ def gather(paths: Sequence[str | Path], out: Path, progress: Progress | None = N
     for path, result in zip(find_cases(paths), swept.cases, strict=True):
         tell(f"report: {result.name}")
         pages.append(_case(path, result))
-    reproduced = _reproduction(out) if any(r.origin == ORIGIN for r in swept.cases) else ()
-    book = Book(bemt.__version__, tuple(pages), reproduced, swept.exit_code)
+    book = Book(bemt.__version__, tuple(pages), swept.exit_code)
     for part in plugins.loaded("REPORT_PARTS"):
         book = part(book, out)
     return attach_diagnoses(book, out)
@@ -206,15 +201,6 @@ def _case(path: Path, result: Result) -> CasePage:
     except GeometryError as error:
         page = replace(page, problems=(f"no picture: {error}",))
     return page
-
-
-def _reproduction(out: Path) -> Sequence[Reproduced]:
-    """Numbers of the thesis beside ours, of a study in the folder of results; the database statistics left out."""
-    document = read_json(out / "reproduction.json")
-    if not isinstance(document, Mapping) or not str(document.get("schema", "")).startswith("bemt.reproduce/"):
-        return []
-    rows = rows_of(Reproduced, document.get("items"), lenient=True)
-    return [item for item in rows if not item.status.startswith("not checked")]
 
 
 def attach_diagnoses(book: Book, out: Path) -> Book:

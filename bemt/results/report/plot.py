@@ -124,7 +124,7 @@ class Trace:
     x: Sequence[Any] | Array
     y: Sequence[Any] | Array
     u: Sequence[Any] | Array | None = None  # Standard uncertainty of y: a band round a line, bars through points
-    colour: str = SERIES[0]  # ``#rrggbb``
+    colour: str = COLOURS["bemt"]  # ``#rrggbb``
     dash: str = ""  # SVG dash pattern; empty is a full line
     shape: str = "circle"  # Marker of points: circle, square, triangle, diamond, cross, bar, star
     points: bool = False  # Points instead of a line

@@ -187,7 +187,8 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
         case.name, case.title, case.kind, case.file.origin, __version__,
         rows=(*rows, *(r for r in beside if r.source in ROW_SOURCES)), variants=tuple(variants),
         other_rows=tuple(r for r in beside if r.source not in ROW_SOURCES), comparisons=tuple(comparisons),
-        audit=tuple(_audit(r, ready, case.ducted) for r in beside if r.source == "cfd"),
+        audit=tuple(_audit(r, setup, ready, case.ducted)
+                    for r, (*_, setup) in zip(beside, recorded, strict=True) if r.source == "cfd"),
         grid_studies=_studies(computed),
         conditions=_description(case, ready, case.file.model.stations),
         assumptions=tuple(map(_assumption, found.moved)),
@@ -202,8 +203,8 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
     )  # fmt: skip
 
 
-Recorded = tuple[Row, int, dict[str, float]]
-"""Recorded value, its operating point, and the standard uncertainty of each channel."""
+Recorded = tuple[Row, int, dict[str, float], Mapping[str, Any]]
+"""Recorded value, its operating point, the standard uncertainty of each channel, and the set-up of a CFD run."""
 
 
 def _recorded_rows(
@@ -215,26 +216,27 @@ def _recorded_rows(
     from bemt.data.readers.references import to_series
 
     rows = []
-    printed = {r.where: r.printed for r in reversed(refs)}  # thrust comes first
+    known_by = {r.where: r for r in reversed(refs)}  # thrust comes first
     for group in to_series(refs, case.name):
         full = group.derive(diameter)
         for i in range(len(full)):
             get = {k: float(full[k][i]) for k in full.values}
             at = points.index((full.rpm[i], full.airspeed_m_s[i], full.density_kg_m3[i]))
             u = {k: float(full.u[k][i]) for k in full.values}
-            name = f"{group.kind} {printed[full.labels[i]]}" if full.labels else group.kind
+            first = known_by[full.labels[i]]
             known = {k: get.get(k, math.nan) for k in (*COMPARED, "rpm", "airspeed_m_s", "density_kg_m3")}
-            row = _row(group.kind, name, known.pop("thrust_N"), **known, M_tip=nominal.M_tip[at], Re=nominal.Re75[at],
-                       u=u.get("thrust_N", math.nan), origin=str(full.provenance.get("source", "")),
+            row = _row(group.kind, f"{group.kind} {first.printed}", known.pop("thrust_N"), **known,
+                       M_tip=nominal.M_tip[at], Re=nominal.Re75[at], u=u.get("thrust_N", math.nan),
+                       origin=str(full.provenance.get("source", "")),
                        remark=str(full.provenance.get("remark", "")))  # fmt: skip
-            rows.append((row, at, u))
+            rows.append((row, at, u, first.setup))
     return rows
 
 
 def _comparisons(recorded: list[Recorded], models: Mapping[str, Dataset]) -> tuple[list[Row], list[Comparison]]:
     """Every model against every recorded value; the error on thrust also goes into the recorded row."""
     rows, out = [], []
-    for row, at, u_D in recorded:
+    for row, at, u_D, _ in recorded:
         errors: dict[str, Any] = {}
         measured = {r for r in COMPARED if not math.isnan(getattr(row, r))}
         measured -= {"CT"} if "thrust_N" in measured else set()
@@ -251,14 +253,15 @@ def _comparisons(recorded: list[Recorded], models: Mapping[str, Dataset]) -> tup
     return rows, out
 
 
-def _audit(row: Row, ready: Model | PairModel, ducted: bool) -> Audit:
-    """Audit of a recorded CFD value by its remark."""
-    from bemt.data.recordings.audit import Audit, CfdFacts, facts_from_remark
+def _audit(row: Row, setup: Mapping[str, Any], ready: Model | PairModel, ducted: bool) -> Audit:
+    """Audit of a recorded CFD value by its set-up, else by its remark."""
+    from bemt.data.recordings.audit import Audit, facts_of, setup_in
 
     D = ready.diameter_m
-    known = CfdFacts(M_tip=float(row.M_tip), J=row.airspeed_m_s / (row.rpm / 60.0 * D),
-                     pitch_over_D=ready.pitch_m / D, CT=row.CT, ducted=ducted)  # fmt: skip
-    return Audit.of(row.label, facts_from_remark(row.remark or "", known))
+    stated = setup or setup_in(row.remark or "")
+    facts = facts_of(stated.get, False, M_tip=float(row.M_tip), CT=row.CT, ducted=ducted,
+                     J=row.airspeed_m_s / (row.rpm / 60.0 * D), pitch_over_D=ready.pitch_m / D)  # fmt: skip
+    return Audit.of(row.label, facts)
 
 
 def _assumption(moved: Moved) -> AssumptionRow:

@@ -29,7 +29,7 @@ def cfd(
     Parameters
     ----------
     campaign : path
-        campaign.toml or its folder; a folder of campaigns is summarised.
+        campaign.toml or its folder.
     only : int, optional
         Run only this point, even if it is recorded.
     ranks : int
@@ -44,8 +44,7 @@ def cfd(
     Returns
     -------
     Told
-        Schema ``bemt.cfd-run/1``, for a folder of campaigns ``bemt.cfd-summary/1``; ``exit_code`` 1 if a point did not
-        converge.
+        Schema ``bemt.cfd-run/1``; ``exit_code`` 1 if a point did not converge.
 
     Raises
     ------
@@ -62,11 +61,6 @@ def cfd(
     from bemt.tools.cfd import campaign as campaigns
 
     name = os.fspath(campaign)
-    if campaigns.is_folder_of_campaigns(name):
-        from bemt.tools.cfd.campaign import summary, summary_text
-
-        found = summary(name)
-        return Told(found.document(), summary_text(found))
     say = progress
     told = None if say is None else (lambda line: say(f"{line}\n"))
     record = campaigns.run(name, only, ranks, None if work is None else os.fspath(work), keep, told)

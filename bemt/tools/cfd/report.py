@@ -1,7 +1,6 @@
 """This project's own CFD: recordings of campaigns (schema ``bemt.cfd-recording/1``) found in the folder of results.
 
 A recording is audited like anybody else's number. What has another shape than expected is left out.
-Its pages: the recordings, and one rotor by blade elements, as a disk in a flow solver and with its blades resolved.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from typing import Any
 from bemt.base.document import Documented
 from bemt.base.page import PageTable, num, table
 from bemt.data.readers import number
-from bemt.data.recordings.audit import Audit, CfdFacts
+from bemt.data.recordings.audit import Audit, CfdFacts, facts_of
 from bemt.results.report.book import Book, CasePage, Page, Section, picture, sections
 from bemt.results.report.diagnosis_block import audit_parts
 from bemt.results.report.gather import read_json, safe_files
@@ -29,9 +28,6 @@ from bemt.tools.cfd.schema import RunRow, run_of
 
 SCHEMA = "bemt.cfd-recording/"
 CSV_BYTES = 20_000_000
-DOMAIN_OVER_D = {"free": 5.0, "pipe": 1.0}
-"""Width of the domains of :mod:`bemt.tools.cfd.openfoam` over the rotor's diameter. [1]"""
-TURBULENCE = {"kOmegaSST": "k-omega SST", "realizableKE": "realizable k-epsilon"}
 Loads = Sequence[tuple[float, float, float]]
 """Radius [m], thrust [N/m] and torque [N] per radius."""
 
@@ -71,14 +67,6 @@ class _Manifest(Documented):
     case: str = ""
     rule: _Rule = _Rule()
     grid_studies: tuple[_Study, ...] = ()
-
-
-@dataclass(frozen=True)
-class Fidelities:
-    """Loads of one rotor by three models, and axial speeds (r/R, [m/s]) behind it by model and distance."""
-
-    loads: Sequence[Mapping[str, str]]  # Rows of a table that somebody else wrote
-    wake: Mapping[tuple[str, str], Sequence[tuple[float, float]]]
 
 
 def read_rows(path: Path) -> list[dict[str, str]]:
@@ -173,15 +161,9 @@ def _facts(run: ShownRun, c: CaseConditions, ducted: bool, levels: int) -> CfdFa
     D, n = c.diameter_m, run.rpm / 60.0
     T, u = abs(run.thrust_N), run.u_thrust_N
     grid = math.sqrt(max((u / T) ** 2 - run.scatter_thrust**2, 0.0)) if T > 0 and levels > 1 else math.nan
-    return CfdFacts(
-        M_tip=math.pi * D * n / c.a_sound_m_s, J=run.airspeed_m_s / (n * D), cells=run.cells,
-        pitch_over_D=c.pitch_075R_m / D, CT=run.thrust_N / (run.density_kg_m3 * n**2 * D**4),
-        domain_over_D=DOMAIN_OVER_D.get(run.domain, math.nan), compressible=run.solver == "compressible",
-        grids=levels, u_grid=grid if grid > 0 else math.nan, drift=run.drift_thrust, wall="function",
-        y_plus=run.yplus_avg, turbulence=TURBULENCE.get(run.turbulence, run.turbulence), thrust_from="forces",
-        steady_mrf=True, skew_deg=0.0 if math.isnan(run.sideslip_deg) else run.sideslip_deg,
-        mass_balance=run.balance_mass, momentum_balance=run.balance_momentum, ducted=ducted,
-    )  # fmt: skip
+    told = {**vars(run), "grids": levels, "u_grid": grid if grid > 0 else math.nan}
+    return facts_of(told.get, True, M_tip=math.pi * D * n / c.a_sound_m_s, J=run.airspeed_m_s / (n * D), ducted=ducted,
+                    pitch_over_D=c.pitch_075R_m / D, CT=run.thrust_N / (run.density_kg_m3 * n**2 * D**4))  # fmt: skip
 
 
 def _plain_rows(found: Sequence[Runs], result: Result) -> list[Row]:
@@ -212,20 +194,14 @@ def _plain_rows(found: Sequence[Runs], result: Result) -> list[Row]:
 
 
 def report_pages(book: Book, out: Path) -> Book:
-    """Pages of the campaigns and of the three fidelities in a folder of results; their numbers join the cases.
+    """Page of the campaigns in a folder of results; their numbers join the cases.
 
     Every run is audited, and the run at a case's operating point compared with its BEMT. The uncertainty of the run is
     that of its audit, so it is unknown as long as one of its lines is.
     """
-    three = fidelities(out, [page.result.name for page in book.cases])
     book, found = attach(book, cfd_runs(out))
-    pages = (
-        Page("cfd", "Own CFD", "Own CFD", [("words", CFD_WORDS)], cfd_sections(found)),
-        Page(
-            "fidelities", "Three fidelities", "Three fidelities", [("words", FIDELITY_WORDS)], fidelity_sections(three)
-        ),
-    )
-    return replace(book, tools=book.tools + pages)
+    page = Page("cfd", "Own CFD", "Own CFD", [("words", CFD_WORDS)], cfd_sections(found))
+    return replace(book, tools=(*book.tools, page))
 
 
 def attach(book: Book, found: Sequence[Runs]) -> tuple[Book, list[Runs]]:
@@ -264,47 +240,6 @@ def _with_own(page: CasePage, found: Sequence[Runs]) -> CasePage:
                       u_input, u_model, abs(run.thrust_N) * share, tuple(serious(bemt.flags)), bemt.rpm,
                       bemt.airspeed_m_s)  # fmt: skip
     return replace(page, result=replace(result, comparisons=(*result.comparisons, line)))
-
-
-FIDELITY_WORDS = (
-    "The disk prescribes BEMT's load and shows what the wake does with it; resolved blades compute their own. "
-    "The far wake of BEMT is drawn without contraction. CPU seconds; other work ran at the same time."
-)
-
-
-def fidelities(out: Path, cases: Sequence[str]) -> Fidelities:
-    """Loads (``disk/loads.csv``) and axial speeds behind the rotor (``disk/wake.csv``) of the report's own cases."""
-    loads = [row for row in read_rows(out / "disk" / "loads.csv") if row.get("case") in cases]
-    runs = {row.get("run"): row.get("source") for row in loads if row.get("run")}
-    wake: dict[tuple[str, str], list[tuple[float, float]]] = {}
-    for row in read_rows(out / "disk" / "wake.csv"):
-        if name := runs.get(row.get("run")):
-            point = value(row.get("r_over_R")), value(row.get("axial_speed_m_s"))
-            wake.setdefault((name, row.get("z_over_R", "")), []).append(point)
-    return Fidelities(loads, wake)
-
-
-def fidelity_sections(found: Fidelities) -> list[Section]:
-    """PageTable of loads, and the axial speed at two distances behind."""
-    rows = [[row["source"], num(value(row.get("J")), 2), num(value(row.get("thrust_N")), 4),
-             num(value(row.get("torque_Nm")), 3), num(value(row.get("seconds")), 2), row.get("what", "")]
-            for row in found.loads]  # fmt: skip
-    heads = ["source", "J", "thrust [N]", "torque [N m]", "CPU [s]", "how"]
-    plots = []
-    places = {"0": " at the disk", "-inf": " far behind"}
-    for behind in ("0.5", "2"):
-        traces: list[Trace] = []
-        for (name, at), points in found.wake.items():
-            if at == f"-{behind}" or at in places:
-                i = len(traces)
-                x, y = zip(*points, strict=True)
-                traces.append(
-                    Trace(name + places.get(at, ""), x, y, None, SERIES[i % len(SERIES)], DASHES[i % len(DASHES)])
-                )
-        if len(traces) > 1:
-            title = f"Axial speed {behind} R behind the rotor, compared with BEMT"
-            plots.append(figure(Plot(title, "r/R [-]", "axial speed [m/s]", traces)))
-    return sections(("Loads and cost", [("table", table(heads, rows))] if rows else []), ("Wake", [("figures", plots)]))
 
 
 CFD_WORDS = (

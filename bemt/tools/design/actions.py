@@ -80,9 +80,10 @@ def choose(
 
     Returns
     -------
-    bemt.tools.design.answer.Choice
+    bemt.tools.design.answer.DriveChoice
         ``.table``, a row per pair, best first: the smallest within 5 % of the least power, then that with the least
-        power (columns as :func:`bemt.tools.design.search.choose` says); ``exit_code`` 1 if nothing is sure.
+        power (columns as :func:`bemt.tools.design.search.choose` says); ``.on_sale``, motors on sale for the first;
+        ``exit_code`` 1 if nothing is sure.
 
     Raises
     ------
@@ -96,17 +97,15 @@ def choose(
     ('10x4.5', 0)
     """
     from bemt.base.given import path_text
-    from bemt.tools.design import answer, search
+    from bemt.tools.design import search
+    from bemt.tools.design.answer import DriveChoice
 
-    table = search.choose(
-        thrust_N, cells, kv=kv, motors=motors, labels=labels, blades=blades, mass_kg=mass_kg, rest_kg=rest_kg,
-        rotors=rotors, airspeed_m_s=airspeed_m_s, max_diameter_in=max_diameter_in, arm_mm=arm_mm,
-        max_tip_mach=max_tip_mach, capacity_Ah=capacity_Ah, minutes=minutes, fan=fan, fluid=fluid, coaxial=coaxial,
-        sure=sure,
-    )  # fmt: skip
+    target = search.target_of(thrust_N, cells, mass_kg, rest_kg, rotors, airspeed_m_s, max_tip_mach, capacity_Ah,
+                              minutes, fan, fluid, coaxial, arm_mm)  # fmt: skip
+    found = DriveChoice(*search.choose(target, kv, motors, labels, blades, max_diameter_in, sure), sure)
     if out is not None:
-        answer.write(table, path_text("out", out))
-    return answer.DriveChoice(table)
+        found.write(path_text("out", out))
+    return found
 
 
 @action(

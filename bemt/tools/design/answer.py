@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from bemt.base import canvas
 from bemt.base.action import as_html
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
-from bemt.base.tables import csv_text, json_text, number_text, write_atomic
+from bemt.base.tables import csv_text, json_text, number_text, text_table, write_atomic
 from bemt.rotors.case.motor import LIST, motors_on_sale
 from bemt.tools.design.search import Target
 
@@ -30,9 +30,18 @@ class DriveChoice:
     ----------
     table : pandas.DataFrame
         As :func:`bemt.tools.design.search.choose` gives it.
+    target : bemt.tools.design.search.Target
+        What was asked for.
+    on_sale : pandas.DataFrame
+        Motors on sale for the first propeller; empty where none is known, or motors were given.
+    sure : float
+        Probability from which on a pair counts as sure.
     """
 
     table: pd.DataFrame
+    target: Target
+    on_sale: pd.DataFrame
+    sure: float
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__") or name == "table":
@@ -43,7 +52,7 @@ class DriveChoice:
         return len(self.table)
 
     def __str__(self) -> str:
-        return text(self.table)
+        return self.text
 
     def __repr__(self) -> str:
         first = self.table.iloc[0]
@@ -53,168 +62,151 @@ class DriveChoice:
         return as_html(repr(self)[1:-1], self.text)
 
     @property
-    def text(self) -> str:
-        """One screen: what to take, and the best motor of each label."""
-        return text(self.table)
+    def good(self) -> pd.DataFrame:
+        """Pairs that are sure to meet the target."""
+        return self.table[self.table.probability >= self.sure]
 
     @property
     def exit_code(self) -> int:
         """1 if no pair is sure to meet the target."""
-        return EXIT_OK if (self.table.probability >= self.table.attrs["sure"]).any() else EXIT_UNCONVERGED
+        return EXIT_OK if len(self.good) else EXIT_UNCONVERGED
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values, ``bemt.choose/1``."""
-        return document(self.table)
+        """Plain values, ``bemt.choose/1``; all pairs, best first."""
+        pairs, on_sale = (table.to_dict("records") for table in (self.table, self.on_sale))
+        return {"schema": SCHEMA, "target": vars(self.target), "sure": self.sure, "pairs": pairs, "on_sale": on_sale}
+
+    @property
+    def text(self) -> str:
+        """One screen: what to take, and the best motor of each label."""
+        t, good = self.target, len(self.good)
+        at = "hover" if t.cruise_N is not None else "this thrust"
+        size = "" if t.airspeed_m_s == 0.0 else f" at {t.airspeed_m_s:g} m/s"
+        fluid = "" if t.fluid == "air" else ", in water"
+        pair = ", each one of a coaxial pair" if t.coaxial else ""
+        what = f"{t.thrust_N:.3g} N" if t.mass_kg is None or t.fixed else f"{t.mass_kg:.3g} kg on {t.rotors} rotors"
+        lines = [
+            *self._headline(at),
+            *self._at_an_end(),
+            "",
+            f"{what}{pair} on {t.cells}S at 50% charge{size}{fluid}, tip Mach up to {t.max_tip_mach:g}: "
+            f"{good} of {len(self.table)} pairs meet it with a probability of {self.sure:.0%} or more",
+            f"power, current and time at {at} of one rotor; ± one standard deviation; best motor of each label",
+            "peak A and full N: at full throttle, what the controller has to stand and what is reached",
+        ]
+        if t.rest_kg is not None:
+            lines.append(
+                f"hover lifts {t.rest_kg:.3g} kg and, of each rotor, motor, propeller, controller and frame (column g, "
+                "by laws with a spread of 25 to 50 %)"
+            )
+        if t.max_diameter_in is None:
+            lines.append("no limit on the diameter: give --max-diameter-in, or --arm-mm of the frame")
+        timed = "min" if t.capacity_Ah is not None else "min/Ah"
+        head = [
+            "propeller", "kv", "P(met)", "power W", "A", "peak A", "g/W", timed, "Mach", "full N", "g",
+            "why not the first",
+        ]  # fmt: skip
+        rows = [
+            [r.label, f"{r.kv:.0f}", f"{r.probability:.0%}", _banded(r.power_W, r.u_power_W),
+             *(number_text(v, 3) for v in (r.current_A, r.peak_A, r.g_per_W, r.minutes)), number_text(r.tip_mach, 2),
+             number_text(r.full_thrust_N, 3), f"{r.propulsion_g:.0f}", r.why or "-"]
+            for r in best_of_each(self.table).head(SHOWN).itertuples()
+        ]  # fmt: skip
+        return "\n".join([*lines, "", text_table(head, rows, range(len(head))), *self._stock()]) + "\n"
+
+    def _at_an_end(self) -> list[str]:
+        """Word of a first motor beyond which none was tried."""
+        kvs = self.table.kv
+        for end, word in ((kvs.max(), "largest"), (kvs.min(), "smallest")):
+            if self.target.sized and kvs.nunique() > 1 and kvs.iloc[0] == end:
+                return [f"{end:.0f} is the {word} K_v that was tried: --kv LOW:HIGH tries others"]
+        return []
+
+    def _headline(self, at: str) -> list[str]:
+        """What to take, and what the least power would be; else the nearest."""
+        table, first, t = self.table, self.table.iloc[0], self.target
+        if not len(self.good) and first.probability > 0.0:
+            return [f"none meets it with a probability of {self.sure:.0%}; nearest is {first.label} with "
+                    f"{first.kv:.0f} rev/min/V at {first.probability:.0%} ({first.why})"]  # fmt: skip
+        if not len(self.good):
+            reach = table.loc[table.full_thrust_N.idxmax()]
+            most = f"{reach.full_thrust_N:.3g} N, with {reach.label} at {reach.kv:.0f} rev/min/V"
+            return [f"none meets it; the most is {most if reach.full_thrust_N > 0.0 else 'no thrust at all'}"]
+        same = table[(table.label == first.label) & (table.probability >= 0.5)]
+        even = f" (an even chance from {same.kv.min():.0f})" if same.kv.min() < first.kv else ""
+        lines = [
+            f"Take {first.label} with {first.kv:.0f} rev/min/V{even}: {_banded(first.power_W, first.u_power_W)} W at "
+            f"{at}, {first.g_per_W:.3g} g/W"
+        ]
+        least = self.good.power_W.idxmin()
+        if least != 0:
+            other = table.loc[least]
+            lines.append(
+                f"The least power has {other.label} with {other.kv:.0f}: {1.0 - other.power_W / first.power_W:.1%} "
+                f"less, {other.diameter_in - first.diameter_in:.3g} in larger"
+                + ("" if t.rest_kg is None else f", {other.propulsion_g - first.propulsion_g:+.0f} g a rotor")
+            )
+        return lines
+
+    def _stock(self) -> list[str]:
+        """Motors on sale for the first propeller, and where they come from."""
+        t, first = self.target, self.table.iloc[0]
+        if not t.sized or t.fluid != "air" or first.probability < self.sure:
+            return []
+        if not (known := len(motors_on_sale())):
+            return ["", 'Motors on sale by name: pip install "bemt[motors]"']
+        source = f"{known:,} of {LIST} (Karakaya, Apache-2.0), makers' numbers; price and stock not known"
+        if self.on_sale.empty:
+            return ["", f"No motor on sale near that K_v and mass is sure to turn {first.label}: none of {source}"]
+        head = ["motor on sale", "kv", "g", "P(met)", "power W", "peak A", "of A", "full N"]
+        rows = [
+            [r.motor, f"{r.kv:.0f}", f"{r.motor_g:.0f}", f"{r.probability:.0%}", _banded(r.power_W, r.u_power_W),
+             *(number_text(v, 3) for v in (r.peak_A, r.max_current_A, r.full_thrust_N))]
+            for r in self.on_sale.itertuples()
+        ]  # fmt: skip
+        lead = f"{first.label} on motors that are on sale, one of a maker ({source})"
+        return ["", lead, text_table(head, rows, range(len(head)))]
+
+    def write(self, out: str | Path) -> None:
+        """Write document, table and picture to a folder."""
+        folder = Path(out)
+        write_atomic(folder / RESULTS[1], csv_text(list(self.table.columns), self.table.to_dict("records")))
+        write_atomic(folder / RESULTS[2], self.picture())
+        write_atomic(folder / RESULTS[0], json_text(self.to_dict()))
+
+    def front(self) -> pd.DataFrame:
+        """Pairs of the best motors that no smaller propeller beats in power, smallest first (the Pareto front)."""
+        sure = best_of_each(self.good).sort_values(["diameter_in", "power_W"])
+        return sure[sure.power_W < sure.power_W.cummin().shift(fill_value=math.inf)]
+
+    def picture(self) -> bytes:
+        """Power over diameter of the best motor of each label, coloured by probability, with the front. PNG bytes."""
+        t = self.target
+        best = best_of_each(self.table).dropna(subset=["power_W"])
+        figure = canvas.figure(7.5, 4.6)
+        ax = figure.add_subplot()
+        dots = ax.scatter(
+            best.diameter_in, best.power_W, c=best.probability, vmin=0.0, vmax=1.0, cmap="viridis", s=32, zorder=3
+        )
+        figure.colorbar(dots, ax=ax, label="probability that the target is met")
+        edge = self.front()
+        if len(edge):
+            ax.errorbar(edge.diameter_in, edge.power_W, edge.u_power_W, color="#D55E00", lw=1.2, capsize=2,
+                        label="least power for the size, ± one standard deviation")  # fmt: skip
+            for row in edge.itertuples():
+                ax.annotate(f"{row.label}, {row.kv:.0f}", (row.diameter_in, row.power_W), xytext=(-4, -4),
+                            textcoords="offset points", fontsize=7, ha="right", va="top")  # fmt: skip
+            ax.legend(frameon=False, fontsize=8)
+        ax.set(xlabel="diameter [in]", ylabel=f"power at {t.at_N:.3g} N [W]")
+        ax.set_title(f"{t.thrust_N:.3g} N on {t.cells}S: best motor of each propeller (label, rev/min/V)", fontsize=10)
+        ax.margins(x=0.12)  # room for the labels to the left
+        canvas.frame(ax)
+        return canvas.png(figure)
 
 
 def best_of_each(table: pd.DataFrame) -> pd.DataFrame:
     """The best motor of each label, in the order of the ranking."""
     return table.drop_duplicates("label").reset_index(drop=True)
-
-
-def text(table: pd.DataFrame) -> str:
-    """One screen: the best motor of each label."""
-    t: Target = table.attrs["target"]
-    sure = table.attrs["sure"]
-    at = "hover" if t.cruise_N is not None else "this thrust"
-    size = "" if t.airspeed_m_s == 0.0 else f" at {t.airspeed_m_s:g} m/s"
-    good = int((table.probability >= sure).sum())
-    fluid = "" if t.fluid == "air" else ", in water"
-    pair = ", each one of a coaxial pair" if t.coaxial else ""
-    what = f"{t.thrust_N:.3g} N" if t.mass_kg is None or t.fixed else f"{t.mass_kg:.3g} kg on {t.rotors} rotors"
-    lines = [*_headline(table, good, at), *_at_an_end(table)]
-    lines += [
-        "",
-        f"{what}{pair} on {t.cells}S at 50% charge{size}{fluid}, tip Mach up to {t.max_tip_mach:g}: "
-        f"{good} of {len(table)} pairs meet it with a probability of {sure:.0%} or more",
-        f"power, current and time at {at} of one rotor; ± one standard deviation; best motor of each label",
-        "peak A and full N: at full throttle, what the controller has to stand and what is reached",
-    ]
-    if t.rest_kg is not None:
-        lines.append(
-            f"hover lifts {t.rest_kg:.3g} kg and, of each rotor, motor, propeller, controller and frame (column g, "
-            "by laws with a spread of 25 to 50 %)"
-        )
-    if t.max_diameter_in is None:
-        lines.append("no limit on the diameter: give --max-diameter-in, or --arm-mm of the frame")
-    lines.append("")
-    timed = "min" if t.capacity_Ah is not None else "min/Ah"
-    head = [
-        "propeller", "kv", "P(met)", "power W", "A", "peak A", "g/W", timed, "Mach", "full N", "g", "why not the first"
-    ]  # fmt: skip
-    rows = [
-        [r.label, f"{r.kv:.0f}", f"{r.probability:.0%}", _banded(r.power_W, r.u_power_W),
-         *(number_text(v, 3) for v in (r.current_A, r.peak_A, r.g_per_W, r.minutes)), number_text(r.tip_mach, 2),
-         number_text(r.full_thrust_N, 3), f"{r.propulsion_g:.0f}", r.why or "-"]
-        for r in best_of_each(table).head(SHOWN).itertuples()
-    ]  # fmt: skip
-    lines += _columns([head, *rows])
-    return "\n".join([*lines, *_on_sale(table)]) + "\n"
-
-
-def _on_sale(table: pd.DataFrame) -> list[str]:
-    """Motors on sale for the first propeller, and where they come from."""
-    t, first, found = table.attrs["target"], table.iloc[0], table.attrs["on_sale"]
-    if not t.sized or t.fluid != "air" or first.probability < table.attrs["sure"]:
-        return []
-    if not (known := len(motors_on_sale())):
-        return ["", 'Motors on sale by name: pip install "bemt[motors]"']
-    source = f"{known:,} of {LIST} (Karakaya, Apache-2.0), makers' numbers; price and stock not known"
-    if not found:
-        return ["", f"No motor on sale near that K_v and mass is sure to turn {first.label}: none of {source}"]
-    head = ["motor on sale", "kv", "g", "P(met)", "power W", "peak A", "of A", "full N"]
-    rows = [[r["motor"], f"{r['kv']:.0f}", f"{r['motor_g']:.0f}", f"{r['probability']:.0%}",
-             _banded(r["power_W"], r["u_power_W"]),
-             *(number_text(r[key], 3) for key in ("peak_A", "max_current_A", "full_thrust_N"))]
-            for r in found]  # fmt: skip
-    return ["", f"{first.label} on motors that are on sale, one of a maker ({source})", *_columns([head, *rows])]
-
-
-def _columns(rows: list[list[str]]) -> list[str]:
-    width = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    return ["  ".join(cell.ljust(w) for cell, w in zip(row, width, strict=True)).rstrip() for row in rows]
-
-
-def _headline(table: pd.DataFrame, good: int, at: str) -> list[str]:
-    """What to take, and what the least power would be; else the nearest."""
-    first, t = table.iloc[0], table.attrs["target"]
-    if not good and first.probability > 0.0:
-        return [f"none meets it with a probability of {table.attrs['sure']:.0%}; nearest is {first.label} with "
-                f"{first.kv:.0f} rev/min/V at {first.probability:.0%} ({first.why})"]  # fmt: skip
-    if not good:
-        reach = table.loc[table.full_thrust_N.idxmax()]
-        most = f"{reach.full_thrust_N:.3g} N, with {reach.label} at {reach.kv:.0f} rev/min/V"
-        return [f"none meets it; the most is {most if reach.full_thrust_N > 0.0 else 'no thrust at all'}"]
-    same = table[(table.label == first.label) & (table.probability >= 0.5)]
-    even = f" (an even chance from {same.kv.min():.0f})" if same.kv.min() < first.kv else ""
-    lines = [
-        f"Take {first.label} with {first.kv:.0f} rev/min/V{even}: {_banded(first.power_W, first.u_power_W)} W at {at}, "
-        f"{first.g_per_W:.3g} g/W"
-    ]
-    least = table[: int(good)].power_W.idxmin()
-    if least != 0:
-        other = table.loc[least]
-        lines.append(
-            f"The least power has {other.label} with {other.kv:.0f}: {1.0 - other.power_W / first.power_W:.1%} less, "
-            f"{other.diameter_in - first.diameter_in:.3g} in larger"
-            + ("" if t.rest_kg is None else f", {other.propulsion_g - first.propulsion_g:+.0f} g a rotor")
-        )
-    return lines
-
-
-def _at_an_end(table: pd.DataFrame) -> list[str]:
-    """Word of a first motor beyond which none was tried."""
-    kv = float(table.kv.iloc[0])
-    for end, word in ((table.kv.max(), "largest"), (table.kv.min(), "smallest")):
-        if table.attrs["target"].sized and table.kv.nunique() > 1 and kv == end:
-            return [f"{kv:.0f} is the {word} K_v that was tried: --kv LOW:HIGH tries others"]
-    return []
-
-
-def document(table: pd.DataFrame) -> dict[str, Any]:
-    """Plain values, ``bemt.choose/1``; all pairs, best first."""
-    return {"schema": SCHEMA, "target": vars(table.attrs["target"]), "sure": table.attrs["sure"],
-            "pairs": table.to_dict("records"), "on_sale": list(table.attrs["on_sale"])}  # fmt: skip
-
-
-def write(table: pd.DataFrame, out: str | Path) -> None:
-    """Write document, table and picture to a folder."""
-    folder = Path(out)
-    write_atomic(folder / RESULTS[1], csv_text(list(table.columns), table.to_dict("records")))
-    write_atomic(folder / RESULTS[2], picture(table))
-    write_atomic(folder / RESULTS[0], json_text(document(table)))
-
-
-def front(table: pd.DataFrame) -> pd.DataFrame:
-    """Pairs of the best motors that no smaller propeller beats in power, smallest first (the Pareto front)."""
-    sure = best_of_each(table[table.probability >= table.attrs["sure"]])
-    sure = sure.sort_values(["diameter_in", "power_W"])
-    return sure[sure.power_W < sure.power_W.cummin().shift(fill_value=math.inf)]
-
-
-def picture(table: pd.DataFrame) -> bytes:
-    """Power over diameter of the best motor of each label, coloured by probability, with the front. PNG bytes."""
-    t: Target = table.attrs["target"]
-    best = best_of_each(table).dropna(subset=["power_W"])
-    figure = canvas.figure(7.5, 4.6)
-    ax = figure.add_subplot()
-    dots = ax.scatter(
-        best.diameter_in, best.power_W, c=best.probability, vmin=0.0, vmax=1.0, cmap="viridis", s=32, zorder=3
-    )
-    figure.colorbar(dots, ax=ax, label="probability that the target is met")
-    edge = front(table)
-    if len(edge):
-        ax.errorbar(edge.diameter_in, edge.power_W, edge.u_power_W, color="#D55E00", lw=1.2, capsize=2,
-                    label="least power for the size, ± one standard deviation")  # fmt: skip
-        for row in edge.itertuples():
-            ax.annotate(f"{row.label}, {row.kv:.0f}", (row.diameter_in, row.power_W), xytext=(-4, -4),
-                        textcoords="offset points", fontsize=7, ha="right", va="top")  # fmt: skip
-        ax.legend(frameon=False, fontsize=8)
-    ax.set(xlabel="diameter [in]", ylabel=f"power at {t.at_N:.3g} N [W]")
-    ax.set_title(f"{t.thrust_N:.3g} N on {t.cells}S: best motor of each propeller (label, rev/min/V)", fontsize=10)
-    ax.margins(x=0.12)  # room for the labels to the left
-    canvas.frame(ax)
-    return canvas.png(figure)
 
 
 def _banded(value: float, u: float) -> str:

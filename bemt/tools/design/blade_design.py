@@ -469,14 +469,13 @@ def case_files(base: Case, found: search.Optimum, points: Sequence[DesignPoint])
     x, chord, beta = found.problem.shape.table(found.best)
     rows = [f"{a:.7f},{c:.7f},{math.degrees(b):.6f}" for a, c, b in zip(x, chord, beta, strict=True)]
     kind = "fan" if base.ducted else "propeller"
-    at = "static" if p.airspeed_m_s == 0.0 else f"at {p.airspeed_m_s:g} m/s"
     written = base.written
     blade: dict[str, Any] = {"stations": "stations.csv", "known_from": "cad"}
     if written["blade"].get("section") is not None:
         blade["section"] = written["blade"]["section"]
     document: dict[str, Any] = {
         "schema": "bemt.case/1", "name": name_of(p, 2.0 * need.R),
-        "title": f"{kind} designed for {p.thrust_N:g} N {at}, {rpm:.0f} rev/min, {inch:.4g} in, {need.blades} blades",
+        "title": f"{kind} designed for {p.thrust_N:g} N {p.at}, {rpm:.0f} rev/min, {inch:.4g} in, {need.blades} blades",
         "origin": "bemt design", **{key: written[key] for key in KEYS_KEPT if written.get(key)},
         "blade": blade, "operating": {"rpm": round(rpm, 1), "airspeed_m_s": float(p.airspeed_m_s)},
     }  # fmt: skip

@@ -28,6 +28,7 @@ def picture(d: Design) -> bytes:
     figure = canvas.figure(10.0, 7.2)
     axes = figure.subplot_mosaic([["blade", "blade"], ["chord", "twist"], ["lift", "load"]],
                                  height_ratios=[0.75, 1.0, 1.0])  # fmt: skip
+    blade, chords, twist, lift, load = (axes[key] for key in ("blade", "chord", "twist", "lift", "load"))
     shape, R = d.found.problem.shape, d.need.R
     x = shape.r / R
     tables = [shape.table(d.found.start), shape.table(d.found.best)]
@@ -37,30 +38,26 @@ def picture(d: Design) -> bytes:
         (tables[1], d.values, {**AFTER, "label": "after"}),
     )
     for (r, chord, beta), v, look in looks:
-        _outline(axes["blade"], 1e3 * R * r, 1e3 * R * chord, look)
-        axes["chord"].plot(r, 1e3 * R * chord, **look)
-        axes["twist"].plot(r, np.degrees(beta), **look)
+        _outline(blade, 1e3 * R * r, 1e3 * R * chord, look)
+        chords.plot(r, 1e3 * R * chord, **look)
+        twist.plot(r, np.degrees(beta), **look)
         for k in d.found.problem.flown:
             label = look if k == d.found.problem.flown[0] else {**look, "label": None, "alpha": 0.5}
-            axes["lift"].plot(x, v.cl[k], **label)
-            axes["load"].plot(x, v.load[k], **label)
+            lift.plot(x, v.cl[k], **label)
+            load.plot(x, v.load[k], **label)
     low, _ = d.found.problem.chord_range
-    axes["chord"].plot(tables[1][0], 1e3 * R * np.exp(low), **LIMIT, label="least")
+    chords.plot(tables[1][0], 1e3 * R * np.exp(low), **LIMIT, label="least")
     for k in d.found.problem.flown:
-        axes["lift"].plot(
-            x, d.values.limit[k], **LIMIT, label="largest allowed" if k == d.found.problem.flown[0] else None
-        )
+        lift.plot(x, d.values.limit[k], **LIMIT, label="largest allowed" if k == d.found.problem.flown[0] else None)
     later = "" if len(d.found.problem.flown) == 1 else " (later points lighter)"
-    axes["blade"].set(xlabel="radius [mm]", ylabel="[mm]", aspect="equal")
-    axes["blade"].set_title(
-        d.name + f": {d.need.blades} blades, outline along the quarter chord, unrolled", fontsize=10
-    )
-    for key, y in (("chord", "chord [mm]"), ("twist", "blade angle [deg]"), ("lift", "lift coefficient" + later),
-                   ("load", "thrust per radius [N/m]")):  # fmt: skip
-        axes[key].set(xlabel="r/R", ylabel=y, xlim=(0.0, 1.0))
-        axes[key].set_ylim(bottom=min(0.0, axes[key].get_ylim()[0]))
-    axes["chord"].legend(frameon=False, fontsize=8)
-    axes["lift"].legend(frameon=False, fontsize=8)
+    blade.set(xlabel="radius [mm]", ylabel="[mm]", aspect="equal")
+    blade.set_title(d.name + f": {d.need.blades} blades, outline along the quarter chord, unrolled", fontsize=10)
+    for ax, y in ((chords, "chord [mm]"), (twist, "blade angle [deg]"), (lift, "lift coefficient" + later),
+                  (load, "thrust per radius [N/m]")):  # fmt: skip
+        ax.set(xlabel="r/R", ylabel=y, xlim=(0.0, 1.0))
+        ax.set_ylim(bottom=min(0.0, ax.get_ylim()[0]))
+    chords.legend(frameon=False, fontsize=8)
+    lift.legend(frameon=False, fontsize=8)
     for ax in axes.values():
         canvas.frame(ax)
     return canvas.png(figure)
@@ -75,10 +72,6 @@ def _outline(ax: Any, r: Array, chord: Array, look: dict[str, Any]) -> None:
 SCHEMA = "bemt.design/1"
 RESULTS = ("design.json", "design.png")
 MUCH = 1.05  # Thrust over that asked for from which on the text says why
-
-
-def _at(V: float) -> str:
-    return "static" if V == 0.0 else f"at {V:g} m/s"
 
 
 def _row(
@@ -135,7 +128,7 @@ def text(d: Design) -> str:
     need, several = d.need, len(d.need.points) > 1
     lines = [
         f"{d.name}: {2.0 * need.R / INCH:.4g} in, {need.blades} blades, "
-        + "; ".join(f"{p.thrust_N:g} N {_at(p.airspeed_m_s)}" + ("" if p.weight else " (floor)") for p in need.points),
+        + "; ".join(f"{p.thrust_N:g} N {p.at}" + ("" if p.weight else " (floor)") for p in need.points),
         "",
     ]
     quality = "eta" if all(p.airspeed_m_s for p in need.points) else "eta, FM" if several else "FM"

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError, refuse, system_fault
-from bemt.base.tables import number_of
+from bemt.base.errors import Fault, refuse
+from bemt.data.readers import load_text
+from bemt.data.readers.split import decimal_mark, split_table
 from bemt.rotors.case.motor import NamedMotor, motors_on_sale, named_motor, resistance_of_mass
 
 # What a rotor's motor, propeller, controller and arm weigh: declared laws with their spread.
@@ -165,33 +165,6 @@ def on_sale(kv: float, mass_g: float, current_A: float) -> list[KnownMotor]:
 HEAD_HINT = f"The first line is {','.join(COLUMNS)}"
 
 
-def _lines(file: Path) -> list[tuple[int, str]]:
-    """Lines that are not blank, with their numbers from 1."""
-    try:
-        lines = file.read_text(encoding="utf-8-sig").splitlines()
-    except OSError as error:
-        raise InputError(system_fault(error)) from error
-    except UnicodeDecodeError:
-        raise InputError(Fault(file.as_posix(), "", "bytes that are no UTF-8", "a CSV in UTF-8")) from None
-    rows = [(i, line) for i, line in enumerate(lines, 1) if line.strip()]
-    if not rows:
-        raise InputError(Fault(file.as_posix(), "", "an empty file", "a CSV of motors", HEAD_HINT))
-    return rows
-
-
-def _number(key: str, cell: str, mark: str) -> tuple[float, Fault | None]:
-    """Value of a cell, and what is wrong with it; an empty one is unknown, other than K_v."""
-    low, high, below, above = LIMITS[key]
-    try:
-        value = float(cell if mark == "," else cell.replace(",", ".")) if cell else math.nan
-    except ValueError:
-        value = math.inf
-    if low <= value <= high or (not cell and key != "kv"):
-        return value, None
-    ask = below if 0.0 < value < low else above if high < value < math.inf else ""
-    return value, Fault("", key, cell or "nothing", f"a number from {low:g} to {high:g}", ask)
-
-
 def read_motors(path: str | os.PathLike[str]) -> tuple[KnownMotor, ...]:
     """Read a CSV with the columns ``name, kv, resistance_mohm, no_load_A``; an empty cell is unknown.
 
@@ -202,32 +175,19 @@ def read_motors(path: str | os.PathLike[str]) -> tuple[KnownMotor, ...]:
     InputError
         With every fault of the file.
     """
-    file = Path(path)
-    name = file.as_posix()
-    rows = _lines(file)
-    mark = max(",;\t", key=rows[0][1].count)
-    try:
-        head, *cells = csv.reader((line for _, line in rows), delimiter=mark)
-    except csv.Error as error:
-        raise InputError(Fault(name, "", str(error), "cells of some words")) from error
-    place = {key.strip().casefold(): i for i, key in enumerate(head)}
+    table, file = split_table(load_text(path), header=True), Path(path).as_posix()
+    place = {key.casefold(): i for i, key in enumerate(table.headings)}
     missing = [key for key in COLUMNS if key.casefold() not in place]
-    if missing:
-        raise InputError([Fault(name, f"column {key}", "none", "this column", HEAD_HINT) for key in missing])
-    if not cells:
-        raise InputError(Fault(name, "", "no motor", "a row or more below the first line"))
-    faults: list[Fault] = []
-    out = []
-    for (line, _), row in zip(rows[1:], cells, strict=True):
-        if len(row) > len(head):
-            got, expected = number_of(len(row), "cell"), f"{len(head)}, as in the first line"
-            faults.append(Fault(name, f"line {line}", got, expected, "A decimal comma? Write 0.8"))
-            continue
-        row += [""] * (len(head) - len(row))
-        found = {key: row[place[key.casefold()]].strip() for key in COLUMNS}
-        values = {key: _number(key, found[key], mark) for key in LIMITS}
-        faults += [replace(f, file=name, where=f"line {line}, {f.where}") for _, f in values.values() if f]
-        kv, mohm, idle = (value for value, _ in values.values())
-        out.append(KnownMotor(found["name"] or f"line {line}", kv, 1e-3 * mohm, idle))
+    refuse(Fault(file, f"column {key}", "none", "this column", HEAD_HINT) for key in missing)
+    decimal, faults, found = decimal_mark(table), list[Fault](), dict[str, Array]()
+    for key, (low, high, below, above) in LIMITS.items():
+        found[key], _, _ = table.numbers(place[key.casefold()], decimal)
+        for line, cell, value in zip(table.lines, table.cells(place[key.casefold()]), found[key], strict=True):
+            if not low <= value <= high and (cell or key == "kv"):
+                hint = below if 0.0 < value < low else above if value > high else ""
+                expected = f"a number from {low:g} to {high:g}"
+                faults.append(Fault(file, f"line {line}, {key}", cell or "nothing", expected, hint))
     refuse(faults)
-    return tuple(out)
+    names = [name or f"line {line}" for name, line in zip(table.cells(place["name"]), table.lines, strict=True)]
+    kv, mohm, idle = (values.tolist() for values in found.values())
+    return tuple(KnownMotor(name, k, 1e-3 * m, i) for name, k, m, i in zip(names, kv, mohm, idle, strict=True))

@@ -251,11 +251,10 @@ def _unreachable(problem: BladeProblem, x: Array, share: float) -> list[Fault]:
     hint = f"Reached then: {'; '.join(words)}" if words else "A larger disk or more speed reaches more"
     faults = []
     for k, p in enumerate(problem.need.points):
-        at = "static" if p.airspeed_m_s == 0.0 else f"at {p.airspeed_m_s:g} m/s"
         speed = "any speed" if p.rpm is None else f"{p.rpm:g} rev/min"
         nearest = max(share, 0.0) * p.thrust_N
         name = "--static-thrust-N" if p.weight == 0.0 else "--thrust-N"
-        faults.append(Fault(name, "", f"{p.thrust_N:g} N {at}, {speed}", f"up to {nearest:.3g} N within the limits",
+        faults.append(Fault(name, "", f"{p.thrust_N:g} N {p.at}, {speed}", f"up to {nearest:.3g} N within the limits",
                             hint if k == 0 else ""))  # fmt: skip
     return faults
 

@@ -162,6 +162,11 @@ class DesignPoint:
     rpm: float | None = None  # Speed; None: whatever gives the thrust with the least power [rev/min]
     weight: float = 1.0  # Share of the time, of which the mean power is taken; 0: a floor only [1]
 
+    @property
+    def at(self) -> str:
+        """Its airspeed in words."""
+        return "static" if self.airspeed_m_s == 0.0 else f"at {self.airspeed_m_s:g} m/s"
+
 
 @dataclass(frozen=True)
 class BladeLimits:

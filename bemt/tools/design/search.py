@@ -126,39 +126,26 @@ class Target:
 
 
 def choose(
-    thrust_N: float | None = None, cells: int | None = None, *, kv: float | Sequence[float] = (80.0, 8000.0),
-    motors: str | os.PathLike[str] | Sequence[str | os.PathLike[str] | KnownMotor] = (),
-    labels: str | Sequence[str] = (), blades: int | Sequence[int] = (2,), mass_kg: float | None = None,
-    rest_kg: float | None = None, rotors: int = 1,
-    airspeed_m_s: float = 0.0, max_diameter_in: float | None = None, arm_mm: float | None = None,
-    max_tip_mach: float = 0.8, capacity_Ah: float | None = None, minutes: float | None = None, fan: bool = False,
-    fluid: str = "air", coaxial: bool = False, sure: float = 0.9,
-) -> pd.DataFrame:  # fmt: skip
-    """Rank propellers and motors for a thrust or a mass; arguments as those of :func:`bemt.choose`.
+    target: Target, kv: float | Sequence[float], motors: Any, labels: Any, blades: Any, max_diameter_in: float | None,
+    sure: float,
+) -> tuple[pd.DataFrame, Target, pd.DataFrame]:  # fmt: skip
+    """Rank propellers and motors; arguments as those of :func:`bemt.choose`.
 
     A row per pair, best first; ``propulsion_g`` is the mass of one rotor's motor, propeller, controller and arm,
     ``at_N`` the thrust of the power, ``why`` says why it is not the first. Pairs that meet the target with the
     probability `sure` come first: the smallest within 5 % of the least power, the one with the least power, then by
-    power. `motors` may be a CSV with ``name,kv,resistance_mohm,no_load_A`` or names of motors on sale; without it up to
-    three of those for the first propeller are in ``table.attrs["on_sale"]``.
-
-    >>> found = choose(8.0, 3, labels=["10x4.5", "9x6", "8x4"], kv=(700, 1500))
-    >>> found.label.iloc[0], bool(found.probability.iloc[0] >= 0.9)
-    ('10x4.5', True)
+    power. Beside it the target as it was tried, and likewise up to three motors on sale for the first propeller.
     """
     import pandas as pd
 
-    target = _target(thrust_N, cells, mass_kg, rest_kg, rotors, airspeed_m_s, max_tip_mach, capacity_Ah, minutes, fan,
-                     fluid, coaxial, arm_mm)  # fmt: skip
     ends, counts = _several(kv), _several(blades)
     _check(ends, max_diameter_in, sure, counts)
     room = math.inf if target.arm_m is None else motors_file.diameter_on(target.arm_m, target.arms) / INCH
     most = min(room, math.inf if max_diameter_in is None else max_diameter_in)
-    target = dataclasses.replace(target, max_diameter_in=None if math.isinf(most) else most)
     kvs = np.geomspace(min(ends), max(ends), 72) if min(ends) < max(ends) else np.array(ends[:1])
     given = [motors] if isinstance(motors, (str, os.PathLike)) else motors
     known = tuple(m for one in given for m in motors_file.motors_of(one))
-    target = dataclasses.replace(target, sized=not known)
+    target = dataclasses.replace(target, max_diameter_in=None if math.isinf(most) else most, sized=not known)
     machines = known or tuple(KnownMotor(f"{v:.0f} rev/min/V", float(v)) for v in kvs)
     names = _several(labels) or _standard(target, counts)
     loads = [found for name in names if (found := _loads(name, target, machines)) is not None]
@@ -168,9 +155,7 @@ def choose(
     rows = [row for one in loads for row in _rows(one, rotor_loads.nearest(one, spreads), machines, target)]
     table = _ranked(pd.DataFrame(rows), sure)
     table["why"] = _reasons(table, target, sure)
-    table.attrs |= {"target": target, "sure": sure}
-    table.attrs["on_sale"] = _on_sale(table, loads, spreads, target, sure) if target.sized else ()
-    return table
+    return table, target, pd.DataFrame(_on_sale(table, loads, spreads, target, sure))
 
 
 MAKERS = 3
@@ -179,11 +164,11 @@ MAKERS = 3
 
 def _on_sale(
     table: pd.DataFrame, loads: Sequence[RotorLoads], spreads: Sequence[LoadScatter], target: Target, sure: float
-) -> tuple[dict[str, Any], ...]:
+) -> list[dict[str, Any]]:
     """The most usual motors on sale for the first propeller that are sure of the target and stand their current."""
     first = table.iloc[0]
-    if first.probability < sure or target.fluid != "air":
-        return ()
+    if not target.sized or first.probability < sure or target.fluid != "air":
+        return []
     one = next(x for x in loads if x.label == first.label)
     even = table.kv[(table.label == first.label) & (table.probability >= 0.5)].min()
     theirs, u = dataclasses.replace(target, sized=False), rotor_loads.nearest(one, spreads)
@@ -196,7 +181,7 @@ def _on_sale(
             found[motor.maker] = row
         if len(found) == MAKERS:
             break
-    return tuple(found.values())
+    return list(found.values())
 
 
 def _several(value: Any) -> tuple[Any, ...]:
@@ -245,11 +230,12 @@ def _clashes(
         yield Fault("", "--rotors", f"{rotors}", "an even number, for pairs of them", "It counts both of a pair")
 
 
-def _target(
+def target_of(
     thrust_N: float | None, cells: int | None, mass_kg: float | None, rest_kg: float | None, rotors: int,
     airspeed_m_s: float, max_tip_mach: float, capacity_Ah: float | None, minutes: float | None, fan: bool, fluid: str,
     coaxial: bool, arm_mm: float | None,
 ) -> Target:  # fmt: skip
+    """What is asked for; all faults at once."""
     given = {
         "--thrust-N": thrust_N, "--mass-kg": mass_kg, "--cells": cells, "--rotors": rotors,
         "--airspeed-m-s": airspeed_m_s, "--max-tip-mach": max_tip_mach, "--capacity-Ah": capacity_Ah,

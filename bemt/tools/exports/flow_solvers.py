@@ -32,9 +32,10 @@ class Su2DiskExport(DiskExport):
         """One row per blade element; scaled so that the rows integrate (trapezoid) to the loads."""
         p = job.loading
         n, D = p.rpm / 60.0, 2.0 * p.R
-        x, ct, cp = _rows(job)
-        body = "\n".join(f" {a:.8f} {t:.9e} {q:.9e} 0.0" for a, t, q in zip(x, ct, cp, strict=True))
         scale = p.rho * n**2 * D**4
+        r, thrust, torque = tables(p)
+        x, ct, cp = r / p.R, thrust * p.R / scale, 2.0 * np.pi * torque * p.R / (scale * D)
+        body = "\n".join(f" {a:.8f} {t:.9e} {q:.9e} 0.0" for a, t, q in zip(x, ct, cp, strict=True))
         text = f"""# {job.case.name}: {p.rpm:.9g} rev/min, {p.airspeed_m_s:.9g} m/s, {p.rho:.9g} kg/m3; load by BEMT
 # {job.rotation}
 # CT = {p.thrust_N / scale:.9g}, CP = {2 * np.pi * p.torque_Nm / (scale * D):.9g} (rotor alone)
@@ -71,16 +72,6 @@ ACTDISK_FILENAME= ActuatorDisk.dat
         CT, CP = (float(np.trapezoid(rows[:, k], rows[:, 0])) for k in (1, 2))
         scale = p.rho * n**2 * D**4
         return CT * scale, CP * scale * D / (2.0 * np.pi)
-
-
-def _rows(job: Job) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    from bemt.tools.exports.rotor_disk import tables
-
-    p = job.loading
-    r, thrust, torque = tables(p)
-    n, D = p.rpm / 60.0, 2.0 * p.R
-    scale = p.rho * n**2 * D**4
-    return r / p.R, thrust * p.R / scale, 2.0 * np.pi * torque * p.R / (scale * D)
 
 
 # Flow360: a BET disk.

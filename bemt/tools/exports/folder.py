@@ -203,26 +203,22 @@ def _manifest(out: Path) -> tuple[Manifest, ManifestContents]:
         return {}, ManifestContents()
 
 
-def _unchanged(out: Path, name: str, digest: str) -> bool:
-    """Whether a file of the manifest is below the folder, no link, and as it was written."""
+def _unchanged(out: Path, name: str, digest: str) -> Path | None:
+    """A file of the manifest that is below the folder, no link, and as it was written; else None."""
     if "\0" in name:
-        return False
+        return None
     home = out.resolve()
     path = (home / name).parent.resolve() / Path(name).name
     inside = path.is_relative_to(home) and not path.is_symlink() and path.is_file()  # anybody may edit a manifest
-    return inside and file_hash(path) == digest
+    return path if inside and file_hash(path) == digest else None
 
 
 def _remove(out: Path, files: Mapping[str, str]) -> None:
     """Remove files of an earlier export that are below a folder and unchanged, and folders that they leave empty."""
-    home = out.resolve()
-    for name, digest in files.items():
-        if not _unchanged(out, name, digest):
-            continue
-        path = (home / name).parent.resolve() / Path(name).name
+    for path in filter(None, (_unchanged(out, name, digest) for name, digest in files.items())):
         path.unlink()
         for folder in path.parents:
-            if folder == home or any(folder.iterdir()):
+            if folder == out.resolve() or any(folder.iterdir()):
                 break
             folder.rmdir()
 
@@ -260,10 +256,8 @@ def export_cases(
             cases.append(load_case(file))
         except InputError as error:
             refused.append(error)
-    if len(paths) > 1:
-        repeated = repeated_names(dict(enumerate(cases)))
-        if repeated:  # they would write into one folder
-            raise InputError(list(repeated.values()))
+    if len(paths) > 1 and (repeated := repeated_names(dict(enumerate(cases)))):  # they would write into one folder
+        raise InputError(list(repeated.values()))
     rpm, airspeed = asked.pop("rpm", None), asked.pop("airspeed_m_s", None)
     for case in cases:
         folder = Path(out) / case.name if len(paths) > 1 else Path(out)
@@ -319,12 +313,10 @@ def _unused(given: Mapping[str, Any], formats: Sequence[str], hold: tuple[str, .
             hint = f"Formats that read it: {', '.join(readers) or 'none here'}"
             faults.append(Fault("", _option(key), shown(value).strip("'"), wanted, hint))
     if hold and all(exports()[name].kind == "solid" for name in formats):
-        fault = Fault("", "--hold", ", ".join(hold), "a format of loads, disks or blades", "Solids hold no loads")
-        faults.append(fault)
-    faults += [
-        Fault("", "--hold", repr(word), f"one of {', '.join(FEATURES)}") for word in hold if word not in FEATURES
-    ]
-    return faults
+        wanted = "a format of loads, disks or blades"
+        faults.append(Fault("", "--hold", ", ".join(hold), wanted, "Solids hold no loads"))
+    known = ", ".join(FEATURES)
+    return faults + [Fault("", "--hold", repr(word), f"one of {known}") for word in hold if word not in FEATURES]
 
 
 def _errors_text(error: Mapping[str, Any]) -> list[str]:

@@ -16,7 +16,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.plugins import missing_for
 from bemt.physics.bem.model import HUB_LOADS
 from bemt.rotors.case.prepare import prepare_case
-from bemt.tools.exports.performance import LOWEST, THINNER, Performance, table_loads
+from bemt.tools.exports.performance import LOWEST, THINNER, Performance, held, table_loads
 
 if TYPE_CHECKING:
     from bemt.rotors.case import Case
@@ -95,23 +95,10 @@ def hub_loads(doc: Mapping[str, Any], rho: float, D: float, rpm: Array, V: Array
     """Changes of thrust [N] and torque [N m], H, Y [N], roll, pitch [N m] of such a document at points, (6, P)."""
     axes = [np.asarray(doc[key], dtype=float) for key in ("rpm", "J_axial", "J_side")]
     n = rpm / 60.0
-    at = (rpm, V / (n * D), side / (n * D))
-    cells = []
-    for axis, x in zip(axes, at, strict=True):
-        i = np.clip(np.searchsorted(axis, x, side="right") - 1, 0, axis.size - 2)
-        cells.append((i, np.clip((x - axis[i]) / (axis[i + 1] - axis[i]), 0.0, 1.0)))
-    (i, a), (j, b), (k, c) = cells
-    scale = rho * n**2 * D**4
-    out = []
-    for name in COEFFICIENTS:
-        C = np.asarray(doc[name], dtype=float)
-        value = sum(
-            (a if p else 1 - a) * (b if q else 1 - b) * (c if r else 1 - c) * C[i + p, j + q, k + r]
-            for p in (0, 1) for q in (0, 1) for r in (0, 1)
-        )  # fmt: skip
-        by = {"dCP": D / (2.0 * np.pi), "CMroll": D, "CMpitch": D}.get(name, 1.0)
-        out.append(value * scale * by)
-    return np.array(out)
+    tables = np.array([doc[name] for name in COEFFICIENTS], dtype=float)
+    arms = np.array([1.0, D / (2.0 * np.pi), 1.0, 1.0, D, D])
+    scale: Array = arms[:, None] * rho * n**2 * D**4
+    return held(axes, tables, rpm, V / (n * D), side / (n * D)) * scale
 
 
 WRENCH_CODE = '''

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -132,19 +133,18 @@ def table_loads(
 ) -> tuple[Array, Array]:
     """Thrust [N] and torque [N m] of a table of coefficients (R, K), bilinear in rpm and J, held at the ends."""
     n = rpm / 60.0
-    J = V / np.where(n > 0.0, n * D, np.inf)
-
-    def cell(axis: Array, x: Array) -> tuple[NDArray[np.intp], Array]:
-        i = np.clip(np.searchsorted(axis, x, side="right") - 1, 0, axis.size - 2)
-        return i, np.clip((x - axis[i]) / (axis[i + 1] - axis[i]), 0.0, 1.0)
-
-    (i, a), (j, b) = cell(rpm_axis, rpm), cell(J_axis, J)
-    ct, cp = (
-        (1 - a) * ((1 - b) * C[i, j] + b * C[i, j + 1]) + a * ((1 - b) * C[i + 1, j] + b * C[i + 1, j + 1])
-        for C in (CT, CP)
-    )
+    ct, cp = held((rpm_axis, J_axis), np.array([CT, CP]), rpm, V / np.where(n > 0.0, n * D, np.inf))
     scale = rho * n**2 * D**4
-    return np.asarray(ct * scale), np.asarray(cp * scale * D / (2.0 * np.pi))
+    return ct * scale, cp * scale * D / (2.0 * np.pi)
+
+
+def held(axes: Sequence[Array], tables: Array, *at: Array) -> Array:
+    """Tables over common axes at points, linear along each axis and held at its ends, (tables, P)."""
+    from scipy.interpolate import RegularGridInterpolator
+
+    inside = [np.clip(x, axis[0], axis[-1]) for axis, x in zip(axes, at, strict=True)]
+    found = RegularGridInterpolator(axes, np.moveaxis(tables, 0, -1))(np.stack(np.broadcast_arrays(*inside), axis=-1))
+    return np.asarray(np.moveaxis(found, -1, 0))
 
 
 def _crossing(J: Array, CT: Array) -> float:

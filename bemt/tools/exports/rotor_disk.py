@@ -46,7 +46,7 @@ class RotorDiskExport(DiskExport):
     id = "rotor-disk"
     title = "OpenFOAM rotorDisk with BEMT's load"
     holds = "T'(r), Q'(r) of one operating point, prescribed; the flow does not change them"
-    features = frozenset({"torque", "rest", "reynolds", "mach", "rotation"})
+    features = frozenset({"torque", "rest", "reynolds", "mach", "rotation", "duct"})  # the load is that of the rotor
     conventions = (
         "axis +z along the thrust, free stream along -z, origin in the disk, metres; profile rows are (deg Cd Cl), "
         "blade rows (profile (r deg chord)); the solver prints lift = thrust/rho, its drag is no torque"
@@ -98,9 +98,6 @@ class RotorDiskExport(DiskExport):
         fine = np.linspace(p.Rhub, p.R, 20001)
         return (float(np.trapezoid(np.interp(fine, r, t), fine)), float(np.trapezoid(np.interp(fine, r, q), fine)))
 
-    # a duct does not matter here: the load is that of the rotor
-    features = features | {"duct"}
-
 
 def tables(p: Loading) -> tuple[Array, Array, Array]:
     """Radii [m] from hub to tip, thrust and torque per metre [N/m], [N] of all blades, linear between radii.
@@ -146,19 +143,18 @@ def _constant(cl: float, cd: float) -> dict[str, str]:
 
 def _zone(p: Loading) -> str:
     h = 0.5 * THICK * p.R
-    action = {
-        "name": "rotorDisk",
-        "type": "cellZoneSet",
-        "action": "new",
-        "source": "cylinderToCell",
-        "sourceInfo": {"p1": vector(0, 0, -h), "p2": vector(0, 0, h), "radius": f"{p.R:.9g}"},
-    }
     text = dictionary("topoSetDict", {}, note="only for a mesh of your own: blockMesh makes the zone here")
-    lines = "\n".join(f"        {k} {v};" for k, v in action.items() if k != "sourceInfo")
-    info = action["sourceInfo"]
-    assert isinstance(info, dict)
-    inner = " ".join(f"{k} {v};" for k, v in info.items())
-    return text + f"actions\n(\n    {{\n{lines}\n        {inner}\n    }}\n);\n"
+    return f"""{text}actions
+(
+    {{
+        name rotorDisk;
+        type cellZoneSet;
+        action new;
+        source cylinderToCell;
+        p1 {vector(0, 0, -h)}; p2 {vector(0, 0, h)}; radius {p.R:.9g};
+    }}
+);
+"""
 
 
 def _mesh(p: Loading) -> str:
