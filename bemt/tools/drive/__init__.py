@@ -1,1 +1,1 @@
-"""The drive behind the rotor: bench map, motor constant, battery-ESC-motor-rotor model."""
+"""The drive behind the rotor: bench map, motor constant, battery-ESC-motor-rotor model, thrusters on a body."""
