@@ -18,7 +18,7 @@ from bemt.data import readers
 from bemt.data.readers import load_text, number
 from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import QUANTITIES, ReferenceTable, RunHead, RunToml, SetupTable, toml_text
-from bemt.data.readers.headings import heading, meanings
+from bemt.data.readers.headings import counts_electrical, heading, meanings
 from bemt.data.readers.recording_toml import QUANTITIES as CHANNELS
 from bemt.data.readers.recording_toml import RecordingToml
 from bemt.data.readers.split import decimal_mark, some, split_table
@@ -295,6 +295,14 @@ class _Measured:
                 out.setdefault(told[0], {"column": h})
         return out
 
+    def electrical(self, facts: Facts) -> dict[str, Facts]:
+        """Column that counts electrical revolutions: that of the rpm, else the one whose heading says so."""
+        speeds = {h: u for h in self.known if (u := heading(h).unit) is not None and u.dimension == "angular_speed"}
+        said = [h for h in speeds if counts_electrical(h)] or list(speeds)
+        if "column" not in facts and len(said) == 1:
+            facts = {"column": said[0], "unit": speeds[said[0]].suffix} | facts
+        return {"electrical_rpm": facts}
+
     def _by_unit(self, name: str, text: str) -> str | None:
         """Quantity that the words of a heading mean and the unit goes with, else the one that a unit stands for."""
         stated = unit_for("", text)
@@ -320,12 +328,14 @@ class _Measured:
 
 
 def write_recording(
-    file: str, out: str, unit: Iterable[str] = (), column: Iterable[str] = (), sign: Iterable[str] = ()
-) -> Path:
+    file: str, out: str, unit: Iterable[str] = (), column: Iterable[str] = (), sign: Iterable[str] = (),
+    pole_pairs: int | None = None,
+) -> Path:  # fmt: skip
     """Write a recording.toml beside a table of measurements, in the same folder; all faults of the options at once.
 
-    `unit` ``NAME=UNIT``, of a quantity or a heading; `column` ``QUANTITY=HEADING``; `sign` ``QUANTITY=-1``. InputError
-    on what is no column, unit or quantity, and where `out` exists.
+    `unit` ``NAME=UNIT``, of a quantity or a heading; `column` ``QUANTITY=HEADING``; `sign` ``QUANTITY=-1``;
+    `pole_pairs` of a speed that counts electrical revolutions. InputError on what is no column, unit or quantity, and
+    where `out` exists.
     """
     import tomlkit
 
@@ -343,16 +353,19 @@ def write_recording(
     _gather("--sign", sign, headings.sign, columns, faults)
     if not (columns or faults):
         columns = headings.plain()
+    if pole_pairs:
+        columns |= {} if "electrical_rpm" in columns else headings.electrical(columns.pop("rpm", {}))
     for quantity, facts in columns.items():
         faults += headings.complete(quantity, facts)
     refuse(faults)
     head = {"file": Path(file).name} | ({"decimal": ","} if decimal_mark(table) == "," else {})
     out_faults = Collector(os.fspath(path))
-    validated(RecordingToml, {"recording": head, "columns": columns}, out_faults)
+    rotor = {"rotor": {"pole_pairs": pole_pairs}} if pole_pairs else {}
+    validated(RecordingToml, {"recording": head, "columns": columns, **rotor}, out_faults)
     out_faults.check()
     inline = {name: tomlkit.inline_table() for name in columns}
     for name, facts in columns.items():
         inline[name].update(facts)
-    document = {"recording": head, "columns": inline}
+    document = {"recording": head, "columns": inline, **rotor}
     write_atomic(path, "# Written by bemt import. Give this file in place of the table.\n" + tomlkit.dumps(document))
     return path
