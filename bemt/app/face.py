@@ -142,8 +142,9 @@ class Parser(argparse.ArgumentParser):
         number = re.match(r"argument (.+?): invalid (number|count) value: '(.*)'$", message)
         if number:
             expected = "a number, without its unit" if number[2] == "number" else "a whole number, without its unit"
-            several = " Several are separated by spaces, the decimal mark is a point." if re.search("[,:]", number[3]) else ""
-            message = f"{number[1]}: got {number[3] or 'nothing'}; expected {expected}.{several}"
+            listed = re.search("[,:]", number[3]) is not None
+            hint = " Several are separated by spaces, the decimal mark is a point." if listed else ""
+            message = f"{number[1]}: got {number[3] or 'nothing'}; expected {expected}.{hint}"
         wrong = re.match(r"argument (.+?): invalid choice: '([^']*)' \(choose from (.*)\)", message)
         if wrong:
             name, got, known = wrong.groups()

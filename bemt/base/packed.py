@@ -154,10 +154,11 @@ def _chosen(name: str, tables: Sequence[str], every: Sequence[str], what: str) -
     found = named if part else tables
     if len(found) == 1:
         return found[0]
-    among = ", ".join(repr(one) for one in (found or every)[:_SHOWN]) + (", ..." if len(found or every) > _SHOWN else "")
+    names = found or every
+    among = ", ".join(map(repr, names[:_SHOWN])) + (", ..." if len(names) > _SHOWN else "")
     kind = what if what == "files" else f"{what} with a table of numbers"
     got = f"no {part!r} among the {what} {among}" if part else f"{len(found) or 'no'} {kind} ({among})"
-    hint = f'Name it behind the file: "{file}#{(found or every or ["NAME"])[0]}"; every command takes that'
+    hint = f'Name it behind the file: "{file}#{(names or ["NAME"])[0]}"; every command takes that'
     raise InputError(Fault(name, "", got, f"one of its {what}", hint))
 
 

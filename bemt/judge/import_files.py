@@ -117,7 +117,8 @@ def import_(
         if out is None:
             hint = f"Add --out {Path(table).with_name('recording.toml').as_posix()}"
             raise InputError(Fault("", "--out", "nothing", "a recording.toml that keeps what you state", hint))
-        written = write_recording(table, os.fspath(out), told["unit"], told["column"], told["sign"], pole_pairs).as_posix()
+        stated = told["unit"], told["column"], told["sign"], pole_pairs
+        written = write_recording(table, os.fspath(out), *stated).as_posix()
         kept = written
         names, told, out, insist = [written], dict.fromkeys(told, []), None, False
     elif pole_pairs:

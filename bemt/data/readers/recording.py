@@ -197,7 +197,8 @@ class Builder:
         if head.told:
             self.warnings.append(head.told)
         if head.unit is None:
-            if not CELLS.search(label.partition("[")[0].strip()):  # a count needs none
+            running = not head.text and np.array_equal(values, values[0] + np.arange(len(values)))  # as pandas writes
+            if not (running or CELLS.search(label.partition("[")[0].strip())):  # a count needs none
                 self.unitless.append(f"{label!r}" + (f" ({head.doubt})" if head.doubt else ""))
         elif head.unit.suffix != "rpm" and (head.unit.factor, head.unit.offset) != (1.0, 0.0):
             with np.errstate(over="ignore"):

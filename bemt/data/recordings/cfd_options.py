@@ -15,7 +15,7 @@ from bemt.base.tables import write_atomic
 from bemt.base.toml import validated
 from bemt.base.toml_text import Collector
 from bemt.data import readers
-from bemt.data.readers import load_text, number
+from bemt.data.readers import generic_csv, load_text, number
 from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import QUANTITIES, ReferenceTable, RunHead, RunToml, SetupTable, toml_text
 from bemt.data.readers.headings import counts_electrical, heading, meanings
@@ -24,6 +24,7 @@ from bemt.data.readers.recording_toml import RecordingToml
 from bemt.data.readers.split import decimal_mark, some, split_table
 from bemt.data.readers.unit_text import TWO_MEANINGS, unit_for
 from bemt.data.recordings.cfd_loads import DUCT
+from bemt.data.recordings.channels import named
 
 Facts = dict[str, str | int]
 """What options say of one quantity: ``column``, ``unit``, ``sign``."""
@@ -252,6 +253,7 @@ class _Measured:
 
     known: Sequence[str]
     taken: dict[str, str] = field(default_factory=dict)  # heading that --column named, its quantity
+    read_as: Mapping[str, str] = field(default_factory=dict)  # quantity that the reader took a heading for
 
     def column(self, name: str, text: str) -> tuple[str, Facts] | Fault:
         """``--column QUANTITY=HEADING``."""
@@ -313,6 +315,7 @@ class _Measured:
         """Add the column and the unit that the headings tell; faults where they do not."""
         if "column" not in facts:
             named = [h for h in self.known if quantity in meanings(h)]
+            named = named if len(named) == 1 or quantity not in self.read_as else [self.read_as[quantity]]
             if len(named) != 1:
                 expected = f"--column {quantity}=HEADING with one of {some(map(repr, named or self.known), 12)}"
                 yield Fault("", "--column", f"no column for {quantity}", expected)
@@ -327,8 +330,18 @@ class _Measured:
             facts["unit"] = found.suffix
 
 
+def _read_as(file: str) -> dict[str, str]:
+    """Heading of each quantity as the reader of tables understands it."""
+    try:
+        found = named(generic_csv.read(file))
+    except InputError:
+        return {}
+    own: Mapping[str, str] = found.provenance["names"]
+    return {units.split_suffix(name)[0]: found.headings[was] for name, was in own.items() if was in found.headings}
+
+
 def write_recording(
-    file: str, out: str, unit: Iterable[str] = (), column: Iterable[str] = (), sign: Iterable[str] = (),
+    file: str, out: str, unit: Iterable[str] = (), column: Iterable[str] = (), sign: Sequence[str] = (),
     pole_pairs: int | None = None,
 ) -> Path:  # fmt: skip
     """Write a recording.toml beside a table of measurements, in the same folder; all faults of the options at once.
@@ -346,7 +359,10 @@ def write_recording(
     if path.exists():
         faults.append(Fault(path.as_posix(), "", "a file that exists", "a new name", "Add the lines to it by hand"))
     table = split_table(load_text(file))
-    headings = _Measured([h for h in table.headings if h])
+    headings = _Measured([h for h in table.headings if h], {}, _read_as(file))
+    loads = [q for q in ("thrust", "torque") if q in headings.read_as]
+    if loads and list(sign) in (["-1"], ["1"]):  # turns all
+        sign = [f"{q}={text}" for q in loads for text in sign]
     columns: dict[str, Facts] = {}
     _gather("--column", column, headings.column, columns, faults)
     _gather("--unit", unit, headings.unit, columns, faults)

@@ -98,6 +98,14 @@ def points_text(reduced: Dataset | str) -> list[str]:
     ]  # fmt: skip
 
 
+def _curve(record: Dataset) -> list[str]:
+    """Rows of coefficients, which are points as they stand."""
+    shown = [k for k in (*SHOWN, "CQ") if k in record.values]
+    rows = [[_cell(k, record[k][i], 5) for k in shown] for i in range(min(len(record), MOST))]
+    many = f"  the first {MOST} of {len(record)} rows:" if len(record) > MOST else f"  {len(record)} rows:"
+    return [many, tables.text_table(shown, rows, (), "    ")]
+
+
 def _cell(name: str, value: float, digits: int) -> str:
     if name == "rpm":
         return tables.speed_text(float(f"{value:.5g}"))
@@ -163,9 +171,10 @@ class ImportedFile:
         ]
         errors = [text for f, text in zip(self.findings, told, strict=True) if f.severity == "error"]
         lines, rows, plain = [self.title, *errors], [], []
+        curve = self.reduced is None and not self.record.clock and bool({"CT", "CP", "CQ"} & self.record.values.keys())
         for name in self.record.values:
-            unit, found = self.record.unit(name), self.means.get(name)
-            if found is None or not math.isfinite(found.value):
+            unit, found = self.record.unit(name).replace("_", "/"), self.means.get(name)  # SI: m_s, rad_s
+            if curve or found is None or not math.isfinite(found.value):
                 plain.append(f"{name} [{unit}]" if unit not in ("", "-", "1") else name)
                 continue
             drift = "-" if found.drift is None else f"{found.drift:+.2%}"
@@ -177,7 +186,7 @@ class ImportedFile:
         if plain:
             lead = "  not averaged: " if rows else "  channels: "
             lines.append(textwrap.fill(", ".join(plain), 110, initial_indent=lead, subsequent_indent="    "))
-        lines += points_text(self.reduced) if self.reduced is not None else []
+        lines += points_text(self.reduced) if self.reduced is not None else _curve(self.record) if curve else []
         lines += [f"  ! {text}" for text in self.warnings]
         lines += [text for text in told if text not in errors]
         return "\n".join(lines)
