@@ -50,7 +50,7 @@ def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.slow
 def test_every_row_of_the_readme_runs(desk: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("manifold3d")
+    pytest.importorskip("cadquery")
     rows = re.findall(r"^\| ([^|`]+) \| (.*) \|$", (ROOT / "README.md").read_text(encoding="utf-8"), flags=re.M)
     scan = next((desk / "scan").rglob("*.stl")).as_posix()
     typed = 0

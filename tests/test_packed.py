@@ -184,3 +184,25 @@ def test_a_mark_in_the_name_of_a_file_is_no_sheet(tmp_path: Path) -> None:
     (tmp_path / "run").write_bytes(text(ROWS))
     with pytest.raises(InputError, match="has none"):
         import_file(tmp_path / "run#3")
+
+
+def test_a_sheet_of_stations_makes_the_case_of_that_blade(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    monkeypatch.chdir(tmp_path)
+    book = openpyxl.Workbook()
+    del book["Sheet"]
+    for title, turn in (("blade A", 0.0), ("blade B", 3.0)):
+        sheet = book.create_sheet(title)
+        for row in [
+            ["r/R", "c/R", "beta (deg)"],
+            *([x, 0.2, 25.0 - 18.0 * x + turn] for x in (0.2, 0.4, 0.6, 0.8, 1.0)),
+        ]:
+            sheet.append(row)
+    book.save("blades.xlsx")
+    with pytest.raises(InputError, match="blade A.*blade B"):
+        bemt.new("a", stations="blades.xlsx", diameter_in=10.0)
+    thrust = []
+    for name in ("A", "B"):
+        bemt.new(name, stations=f"blades.xlsx#blade {name}", diameter_in=10.0)
+        thrust.append(float(bemt.load(tmp_path / name).solve(rpm=5000.0).thrust_N[0]))
+    assert thrust[1] > 1.1 * thrust[0]

@@ -158,7 +158,7 @@ def _chosen(name: str, tables: Sequence[str], every: Sequence[str], what: str) -
     among = ", ".join(map(repr, names[:_SHOWN])) + (", ..." if len(names) > _SHOWN else "")
     kind = what if what == "files" else f"{what} with a table of numbers"
     got = f"no {part!r} among the {what} {among}" if part else f"{len(found) or 'no'} {kind} ({among})"
-    hint = f'Name it behind the file: "{file}#{(names or ["NAME"])[0]}"; every command takes that'
+    hint = f'Name it behind the file: "{file}#{(names or ["NAME"])[0]}"'
     raise InputError(Fault(name, "", got, f"one of its {what}", hint))
 
 

@@ -39,6 +39,7 @@ _LOADS = {"thrust_N", "torque_Nm", "CT", "CP"}
 SHOWN = ("run", "pwm_s", "throttle", "rpm", "airspeed_m_s", "J", "thrust_N", "torque_Nm", "power_W",
          "electrical_power_W", "CT", "CP", "eta", "FM")  # fmt: skip
 """Channels of the table of points, as far as they are there."""
+_ROWS = 20  # channels on one screen
 MOST = 40
 """Points shown; JSON has all."""
 
@@ -179,6 +180,10 @@ class ImportedFile:
                 continue
             drift = "-" if found.drift is None else f"{found.drift:+.2%}"
             rows.append([name, unit or "-", tables.number_text(found.value, 6), drift, found.over])
+        if len(rows) > _ROWS:  # of a report by zones the sums, with their parts in JSON
+            sums = [row for row in rows if "_total_" in row[0]] or rows[:_ROWS]
+            lines.append(f"  {len(sums)} of {len(rows)} channels (--json has all):")
+            rows = sums
         if rows:
             lines.append(
                 tables.text_table(["channel", "unit", "mean", "drift", "averaged over"], rows, (0, 1, 4), "  ")

@@ -110,10 +110,10 @@ def _inputs(page: CasePage) -> Section:
 
 
 def opening(page: CasePage) -> list[Any]:
-    """First pictures of a report on one case: the recording and its prediction, else thrust over speed and CT over J."""
+    """First pictures of a report on one case: recording and prediction, else thrust over speed and CT over J."""
     told = first_pictures(page.diagnosis) if page.diagnosis else []
     curves = _curves(page)
-    return told or [figure(p) for p in (curves[len(LABELS)], curves[0])] if told or curves else []
+    return told or [figure(curves[k]) for k in (len(LABELS), 0) if curves]
 
 
 def _performance(page: CasePage) -> Section:
