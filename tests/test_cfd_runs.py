@@ -719,12 +719,12 @@ def test_a_point_near_zero_thrust_does_not_make_the_headline() -> None:
 
 def _points(ratios: Sequence[float], u: float = 1.0) -> list[one_run.PointOfRun]:
     loads = [one_run.BothLoads(10.0, 0.2, 10.0 * r, u, {"input": u, "model": 0.1}, 10.0 * (r - 1.0),
-                               np.hypot(0.2, u), one_run._verdict(10.0 * (r - 1.0), np.hypot(0.2, u)))
+                               math.hypot(0.2, u), one_run._verdict(10.0 * (r - 1.0), math.hypot(0.2, u)))
              for r in ratios]  # fmt: skip
     return [one_run.PointOfRun("", 6000.0, k, 1.2, 0.0, {"thrust_N": v}, ()) for k, v in enumerate(loads)]
 
 
-def test_the_point_that_the_sentence_speaks_of_is_on_the_screen(tmp_path: Path) -> None:
+def test_the_point_that_the_sentence_speaks_of_is_on_the_screen() -> None:
     """Of many points the one of the largest difference is shown, whichever it is."""
     for worst in range(12):
         points = _points([1.4 if k == worst else 1.0 for k in range(12)])
