@@ -302,7 +302,7 @@ class _Measured:
         speeds = {h: u for h in self.known if (u := heading(h).unit) is not None and u.dimension == "angular_speed"}
         said = [h for h in speeds if counts_electrical(h)] or list(speeds)
         if "column" not in facts and len(said) == 1:
-            facts = {"column": said[0], "unit": speeds[said[0]].suffix} | facts
+            facts = {"column": said[0], "unit": speeds[said[0]].suffix, **facts}
         return {"electrical_rpm": facts}
 
     def _by_unit(self, name: str, text: str) -> str | None:
