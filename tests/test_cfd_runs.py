@@ -7,7 +7,7 @@ import csv
 import json
 import math
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,8 @@ from bemt.data.recordings.cfd_run import assemble
 from bemt.data.recordings.cfd_setup import GRID_FLOOR, conditions_that_differ, grid_floor
 from bemt.judge.compare import one_run
 from bemt.physics.dataset import Dataset
+from bemt.rotors.case.load import Assumption
+from bemt.rotors.case.propagate import Moved
 
 T, Q, RPM = 3.8, 0.062, 8000.0
 """Thrust [N], torque [N m] and speed of every run made here."""
@@ -713,3 +715,30 @@ def test_a_point_near_zero_thrust_does_not_make_the_headline() -> None:
     points = [*(point(5.0 + k, 5.1 + k) for k in range(7)), *(point(0.6, 0.05) for _ in range(3))]
     told = one_run._sentence(points, "CFD")
     assert "agree in 7 of 10 values" in told and "-5 % of the largest thrust" in told and "9" not in told
+
+
+def _points(ratios: Sequence[float], u: float = 1.0) -> list[one_run.PointOfRun]:
+    loads = [one_run.BothLoads(10.0, 0.2, 10.0 * r, u, {"input": u, "model": 0.1}, 10.0 * (r - 1.0),
+                               math.hypot(0.2, u), one_run._verdict(10.0 * (r - 1.0), math.hypot(0.2, u)))
+             for r in ratios]  # fmt: skip
+    return [one_run.PointOfRun("", 6000.0, k, 1.2, 0.0, {"thrust_N": v}, ()) for k, v in enumerate(loads)]
+
+
+def test_the_point_that_the_sentence_speaks_of_is_on_the_screen() -> None:
+    """Of many points the one of the largest difference is shown, whichever it is."""
+    for worst in range(12):
+        points = _points([1.4 if k == worst else 1.0 for k in range(12)])
+        found = one_run.RunComparison("run", "case", "cfd", {}, tuple(points), (), 0.0, {}, (),
+                                      one_run._sentence(points, "CFD"), "")  # fmt: skip
+        told = one_run.text(found)
+        assert "+40 %" in told.splitlines()[0] and any("differs" in line for line in told.splitlines()[3:])
+
+
+def test_bands_that_hide_a_difference_name_what_would_narrow_them() -> None:
+    """The unknown of the largest part, with the width that is left without it; silent where the run differs."""
+    moved = [Moved(Assumption(f"blade.{name}", 0.5, (0.0, 1.0), False, ""), (), {"thrust_N": np.array([u])})
+             for name, u in (("camber", 0.3), ("chord", 0.9))]  # fmt: skip
+    told = one_run._narrower(_points([1.05]), moved)
+    assert "chord" in told and f"{np.sqrt(1.0 + 0.04 - 0.81):.2g}" in told
+    assert not one_run._narrower(_points([1.5]), moved)
+    assert not one_run._narrower(_points([1.01], 0.1), moved)  # the band of the run is the wider

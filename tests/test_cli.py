@@ -469,3 +469,30 @@ def test_a_port_in_use_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
         port = server.getsockname()[1]
         assert cli.main(["ui", "--no-browser", "--port", str(port)]) == 2
     assert f"--port: got {port}, which is in use; expected a free port." in capsys.readouterr().err
+
+
+def test_a_count_may_be_a_list_and_a_number_with_a_comma_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    """A comma between whole counts cannot be read twice; 6,000 or 2,5 can, and is not guessed."""
+    assert cli.parsed(["choose", "--thrust-N", "7", "--cells", "3", "--blades", "2,3"])[1]["blades"] == [2, 3]
+    assert cli.parsed(["choose", "--thrust-N", "7", "--cells", "3", "--blades", "2", "3"])[1]["blades"] == [2, 3]
+    for wrong in ("6,000", "2,5", "3000:9000"):
+        with pytest.raises(SystemExit):
+            cli.parsed(["estimate", "10x5", "--rpm", wrong])
+        assert "spaces" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", sorted(registry.homes()))
+def test_an_old_option_names_one_that_the_command_has(command: str) -> None:
+    known = {p.option for p in parameters(registry.find(command))}
+    for old in registry.EVERYWHERE:
+        told: list[str] = []
+        words = registry.renamed(command, [old, "x"], known, told.append)
+        assert words == [old, "x"] or not words[0].startswith("--") or words[0] in known
+
+
+def test_a_word_that_is_no_command_of_the_laboratory_is_answered_with_those_that_are(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert cli.main(["lab", "nothing"]) == 2
+    told = capsys.readouterr().err
+    assert "cite" in told and "estimate" not in told

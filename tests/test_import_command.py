@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import bemt
 from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.data.recordings.adapt import Choice
@@ -257,3 +258,22 @@ def test_fahrenheit_under_celsius_is_an_error_that_says_so(put: Callable[..., Pa
     path = put("air.csv", f"rpm,thrust (N),torque (Nm),air temperature (C),air pressure (hPa)\n{rows}")
     text = import_files([str(path)]).text()
     assert "64.4 F is 18 C" in text and "Fahrenheit taken for Celsius" in text.splitlines()[1]
+
+
+def test_a_sign_turns_the_load_that_the_reader_sees_whatever_it_is_headed(tmp_path: Path) -> None:
+    """What import suggests of a negative Fz is what its option takes; -1 alone turns each load of the table."""
+    rows = [(3000, -1.1, -0.023), (4000, -2.0, -0.041), (5000, -3.1, -0.062)]
+    file = tmp_path / "cell.csv"
+    file.write_text("RPM,Fz (N),Mz (Nm)\n" + "".join(f"{n},{T},{Q}\n" for n, T, Q in rows))
+    bemt.import_(file, sign={"thrust": "-1"}, out=tmp_path / "one.toml")
+    bemt.import_(file, sign={"": "-1"}, out=tmp_path / "all.toml")
+    one, both = bemt.read(tmp_path / "one.toml"), bemt.read(tmp_path / "all.toml")
+    assert np.allclose(one.thrust_N, [1.1, 2.0, 3.1]) and np.allclose(one.torque_Nm, [-0.023, -0.041, -0.062])
+    assert np.allclose(both.thrust_N, [1.1, 2.0, 3.1]) and np.allclose(both.torque_Nm, [0.023, 0.041, 0.062])
+
+
+def test_a_table_of_coefficients_is_shown_row_by_row(tmp_path: Path) -> None:
+    file = tmp_path / "static.csv"
+    file.write_text("rpm;CT;CP\n3000;0,0951;0,0420\n4000;0,0958;0,0415\n")
+    told = bemt.import_(file).text
+    assert all(number in told for number in ("0.0951", "0.0415", "4000"))

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import bemt
 from bemt.base import packed
 from bemt.base.errors import InputError
 from bemt.data import readers
@@ -103,7 +104,7 @@ REFUSED = {
     "a document type": (
         lambda _: zipped(**{"xl/workbook.xml": b"<w/>", "xl/worksheets/sheet1.xml": _DOCTYPE}), "document type"),
     "a cell of 131,073 characters": (lambda _: b'rpm,note\n5000,"' + b"x" * 131_073 + b'"\n5100,b\n', "a line of 131"),
-    "two files": (lambda _: zipped(a=b"1", b=b"2"), "a zip of 2 files"),
+    "two files": (lambda _: zipped(a=b"1", b=b"2"), "2 files"),
     "a binary workbook": (lambda _: zipped(**{"xl/workbook.bin": b"1"}), "xlsb"),
     "half a gzip": (lambda _: gzip.compress(text(ROWS))[:-12], "damaged gzip"),
 }  # fmt: skip
@@ -141,3 +142,67 @@ def test_what_is_whole_of_a_damaged_gzip_is_kept() -> None:
     raw = bytearray(gzip.compress(whole))
     got, damage = packed.gunzip(bytes(raw[:200_000]), "b")
     assert damage and len(got) > 190_000 and whole.startswith(got)
+
+
+def _two_tables(path: Path, form: str) -> None:
+    """A file of two tables, the second with twice the thrust."""
+    twice = [ROWS[0], *([n, 2.0 * T, Q] for n, T, Q in ROWS[1:])]  # type: ignore[operator]
+    if form == "zip":
+        path.write_bytes(zipped(**{"first run": text(ROWS), "second run": text(twice)}))
+        return
+    book = pytest.importorskip("openpyxl").Workbook()
+    for title, rows in (("first run", ROWS), ("second run", twice)):
+        sheet = book.create_sheet(title)
+        for row in rows:
+            sheet.append(row)
+    del book["Sheet"]
+    book.save(path)
+
+
+@pytest.mark.parametrize("form", ["xlsx", "zip"])
+def test_one_of_several_tables_is_asked_for_and_taken_by_name_at_every_door(form: str, tmp_path: Path) -> None:
+    """No sheet is taken by guess; the name that the refusal shows is one that works, and a recording.toml keeps it."""
+    file = tmp_path / f"runs.{form}"
+    _two_tables(file, form)
+    with pytest.raises(InputError, match="first run.*second run") as error:
+        import_file(file)
+    shown = str(error.value).split('"')[1]
+    assert np.array_equal(import_file(shown)["thrust_N"], [row[1] for row in ROWS[1:]])
+    second = import_file(f"{file}#second run")["thrust_N"]
+    assert np.array_equal(second, [2.0 * row[1] for row in ROWS[1:]])  # type: ignore[operator]
+    assert np.array_equal(import_file(f"{file}#SECOND RUN")["thrust_N"], second)
+    kept = tmp_path / "second.toml"
+    assert bemt.import_(file, sheet="second run", out=kept).exit_code == 0
+    assert np.array_equal(import_file(kept)["thrust_N"], second)
+    with pytest.raises(InputError, match="no 'third'"):
+        import_file(f"{file}#third")
+
+
+def test_a_mark_in_the_name_of_a_file_is_no_sheet(tmp_path: Path) -> None:
+    (tmp_path / "run#2.csv").write_bytes(text(ROWS))
+    assert len(import_file(tmp_path / "run#2.csv")) == len(ROWS) - 1
+    (tmp_path / "run").write_bytes(text(ROWS))
+    with pytest.raises(InputError, match="has none"):
+        import_file(tmp_path / "run#3")
+
+
+def test_a_sheet_of_stations_makes_the_case_of_that_blade(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    monkeypatch.chdir(tmp_path)
+    book = openpyxl.Workbook()
+    del book["Sheet"]
+    for title, turn in (("blade A", 0.0), ("blade B", 3.0)):
+        sheet = book.create_sheet(title)
+        for row in [
+            ["r/R", "c/R", "beta (deg)"],
+            *([x, 0.2, 25.0 - 18.0 * x + turn] for x in (0.2, 0.4, 0.6, 0.8, 1.0)),
+        ]:
+            sheet.append(row)
+    book.save("blades.xlsx")
+    with pytest.raises(InputError, match="blade A.*blade B"):
+        bemt.new("a", stations="blades.xlsx", diameter_in=10.0)
+    thrust = []
+    for name in ("A", "B"):
+        bemt.new(name, stations=f"blades.xlsx#blade {name}", diameter_in=10.0)
+        thrust.append(float(bemt.load(tmp_path / name).solve(rpm=5000.0).thrust_N[0]))
+    assert thrust[1] > 1.1 * thrust[0]

@@ -810,7 +810,7 @@ def test_a_recording_toml_that_is_there_is_the_file_to_give(write: Write, projec
 def test_a_speed_under_a_name_of_its_own_comes_with_the_line_to_write(write: Write) -> None:
     got = importers.read(write("rpm_12_magnets,thrust_N\n4000,1\n8000,4\n"))
     assert said(got, '[columns] rpm = { column = "rpm_12_magnets", unit = "rpm" }')
-    for known in ("rpm", "erpm", "rpm_A,rpm_B"):
+    for known in ("rpm", "rpm_A,rpm_B"):
         text = f"{known},thrust_N\n" + "".join(
             f"{','.join([n] * (known.count(',') + 1))},1\n" for n in ("4000", "8000")
         )

@@ -9,10 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import bemt
 from bemt.base import units
 from bemt.base.errors import InputError
 from bemt.data import readers as importers
 from bemt.data.readers import recording_toml
+from bemt.data.recordings.channels import named
+from bemt.data.recordings.check import check
+from bemt.data.recordings.load import import_file
 from bemt.physics.air import Air
 
 TABLE = "t,F,M,eRPM,U\n" + "".join(f"{20 * k},{-(100 + k)},{2 * k + 40},{70000 + 700 * k},11.1\n" for k in range(12))
@@ -223,3 +227,21 @@ def test_what_a_table_shows_of_itself_survives_a_statement_about_one_column(put:
     alone = importers.read(put("", head + rows).with_name("run.csv"))
     assert {"electrical_power_W", "CP"} <= alone.values.keys() - {"Zug"} <= stated.values.keys()
     assert "power_W" not in stated
+
+
+@pytest.mark.parametrize("heading", ["eRPM", "ESC speed (erpm)", "Electrical Speed (eRPM)"])
+def test_electrical_revolutions_are_no_speed_before_the_pole_pairs_are_stated(heading: str, tmp_path: Path) -> None:
+    """A raw eRPM is no speed of the rotor; the command that is shown, with the pairs, makes it one, without a fault."""
+    rows = [(3000, 1.1), (4000, 2.0), (5000, 3.1), (6000, 4.6), (7000, 6.2), (8000, 8.1)]
+    file = tmp_path / "esc.csv"
+    file.write_text(f"{heading},Thrust (N)\n" + "".join(f"{7 * n},{T}\n" for n, T in rows))
+    found = named(import_file(file))
+    assert "rpm" not in found
+    assert any("--pole-pairs PAIRS" in note for note in import_file(file).notes)
+    told = bemt.import_(file, pole_pairs=7, out=tmp_path / "esc.toml")
+    kept = import_file(tmp_path / "esc.toml")
+    assert np.allclose(kept["rpm"], [n for n, _ in rows])
+    assert told.exit_code == 0
+    assert not [f for f in check(kept) if f.severity == "error"]
+    with pytest.raises(InputError, match="pole"):
+        bemt.diagnose(file, case="10x5")

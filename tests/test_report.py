@@ -579,6 +579,10 @@ def test_a_report_of_one_case_made_from_its_label_holds_no_word_of_the_thesis(
     words = " ".join([*said, *(unquote(v or "") for _, a in reader.found for v in a.values())]).lower()
     for word in ("thesis", "cahill", "northeastern", "robot", "fluent", "own cfd", "reproduc"):
         assert word not in words, word
+    front = page[page.index('id="front"') : page.index('id="case-1')]
+    assert re.search(r'<figure class="plot.*?<g class="trace" data-t="0"[^>]*>.*?<path', front, re.DOTALL), (
+        "the first picture stands on the front page"
+    )
 
 
 def test_a_report_of_own_cases_holds_no_word_of_the_thesis(made: tuple[Book, Path], text: str) -> None:

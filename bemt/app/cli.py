@@ -98,10 +98,11 @@ def _dispatch(argv: list[str]) -> int:
         if gone:
             complain(plugins.missing(gone))
             return EXIT_INPUT
-        names = [name for name in registry.ORDER if name in known]
-        near = did_you_mean(words[0], known)
-        what = f"bemt: error: COMMAND: got {words[0]}; expected one of {', '.join(names)}, {LAB}.{near}"
-        print(f"usage: bemt [-h] [--version] COMMAND ...\n{what}", file=sys.stderr)
+        shown = [name for name in registry.ORDER if name in known]
+        names = sorted(set(known) - set(shown)) if lab else [*shown, LAB]
+        prog, near = (f"bemt {LAB}" if lab else "bemt"), did_you_mean(words[0], known)
+        what = f"{prog}: error: COMMAND: got {words[0]}; expected one of {', '.join(names)}.{near}"
+        print(f"usage: {prog} [-h]{'' if lab else ' [--version]'} COMMAND ...\n{what}", file=sys.stderr)
         return EXIT_INPUT
     return run(registry.find(words[0]), words[1:], f"bemt {LAB}" if lab else "bemt")
 

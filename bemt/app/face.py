@@ -51,7 +51,7 @@ class Option:
         if self.kind == "number":
             return float(text)
         if self.kind == "count":
-            return int(text)
+            return [int(part) for part in text.split(",")] if self.many else int(text)
         if self.kind == "choice":
             return {c.lower(): c for c in self.choices}.get(text.lower(), text)
         return text
@@ -119,6 +119,7 @@ class Parser(argparse.ArgumentParser):
         self.register("action", None, _Once)
         self.register("action", "store", _Once)
         self._words: list[str] = []
+        self.like = ""
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Parse; an unknown option is answered with the nearest."""
@@ -127,6 +128,7 @@ class Parser(argparse.ArgumentParser):
         if extra:
             options = [option for action in self._actions for option in action.option_strings]
             words = [did_you_mean(word.partition("=")[0], options) for word in extra if word.startswith("-")]
+            words += [" Quotes keep words together."] if not extra[0].startswith("-") else []
             self.error(f"unrecognized arguments: {' '.join(extra)}" + "".join(f".{w}" for w in words if w))
         return known
 
@@ -136,10 +138,13 @@ class Parser(argparse.ArgumentParser):
             options = [option for action in self._actions for option in action.option_strings]
             typed = [word.partition("=")[0] for word in self._words if word.startswith("--")]
             message += "".join(f". Got {w}.{did_you_mean(w, options)}" for w in typed if w not in options)
+            message += f". As in: {self.like}" if self.like else ""
         number = re.match(r"argument (.+?): invalid (number|count) value: '(.*)'$", message)
         if number:
             expected = "a number, without its unit" if number[2] == "number" else "a whole number, without its unit"
-            message = f"{number[1]}: got {number[3] or 'nothing'}; expected {expected}."
+            listed = re.search("[,:]", number[3]) is not None
+            hint = " Several are separated by spaces, the decimal mark is a point." if listed else ""
+            message = f"{number[1]}: got {number[3] or 'nothing'}; expected {expected}.{hint}"
         wrong = re.match(r"argument (.+?): invalid choice: '([^']*)' \(choose from (.*)\)", message)
         if wrong:
             name, got, known = wrong.groups()
@@ -158,6 +163,7 @@ def parser_of(function: Callable[..., Any], prog: str = "bemt", everything: bool
         prog=f"{prog} {told.command}", description=described(function)[0], add_help=False,
         epilog=f"{more}example: {prog} {told.example}", formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
+    parser.like = f"{prog} {told.example}"
     for one in all_of_it:
         _add(parser, one, told, everything or one not in hidden)
     parser.add_argument("--json", action="store_true", help="print one JSON document")
@@ -211,6 +217,8 @@ def values(function: Callable[..., Any], args: argparse.Namespace) -> dict[str, 
             continue
         if one.kind == "mapping":
             given = _mapping(one, given)
+        elif one.kind == "count" and one.many:
+            given = [count for word in given for count in word]
         elif one.kind == "pair":
             given = _pair(one, given)
         out[one.name] = given

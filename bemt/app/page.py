@@ -106,10 +106,19 @@ def recording(st: Any, propeller: bemt.Propeller) -> Any:
     file = st.file_uploader("Drop a bench log or a table (rpm, thrust_N, torque_Nm, ...)", key="recording")
     if file is None:
         return None
+    sheet = ""
+    if Path(file.name).suffix.lower() in (".xlsx", ".xlsm", ".xls", ".ods", ".zip"):
+        sheet = st.text_input("Sheet of the workbook, or file in the zip, where it has several", key="sheet").strip()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / Path(file.name).name
         path.write_bytes(file.getvalue())
-        points = bemt.read(path)
+        path = path.with_name(f"{path.name}#{sheet}") if sheet else path
+        try:
+            points = bemt.read(path)
+        except bemt.InputError as error:
+            for fault in error.faults:
+                st.error(str(fault).replace(f"{folder}/", ""))
+            return None
         for note in points.notes:
             st.caption(note)
         st.dataframe(points.to_pandas(), height=180)

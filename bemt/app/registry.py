@@ -142,7 +142,7 @@ def renamed(command: str, argv: Sequence[str], known: Collection[str], say: Call
             word = word.removeprefix("fixed:")
         name, mark, value = word.partition("=")
         new = None if name in known else EVERYWHERE.get(name)
-        if new is None:
+        if new is None or (new and new.split()[0] not in known):  # another command's
             out.append(word)
             continue
         say(f"{command}: {name} is now {new or 'a word without an option'}")

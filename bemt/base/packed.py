@@ -5,10 +5,11 @@ from __future__ import annotations
 import csv
 import datetime
 import io
+import os
 import re
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import IO, Any
 from xml.parsers import expat
@@ -22,9 +23,21 @@ MAX_CELLS = 1 << 24
 GZIP, ZIP, OLE = b"\x1f\x8b", b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
 _BLOCK = 1 << 16
 _FEWEST_ROWS = 2
+_SHOWN = 6  # names in a message
 _DEEPEST = 2  # a packed file in a zip
 _ODS = "application/vnd.oasis.opendocument.spreadsheet"
 _REFERENCE = re.compile(r"([A-Z]{1,3})(\d{1,7})")
+
+
+def part_of(path: str | os.PathLike[str]) -> tuple[str, str]:
+    """File, and the sheet or packed file that is named in it: ``book.xlsx#Sheet 2``; a file of the whole name is that.
+
+    >>> part_of("bench.csv")
+    ('bench.csv', '')
+    """
+    name = os.fspath(path)
+    file, mark, part = name.rpartition("#")
+    return (file, part) if mark and not os.path.exists(name) and os.path.isfile(file) else (name, "")
 
 
 def packed(head: bytes) -> bool:
@@ -73,12 +86,15 @@ def gunzip_stream(source: IO[bytes], out: IO[bytes], name: str, most: int | None
 def unpacked(raw: bytes, name: str, most: int | None = None, depth: int = 0) -> bytes:
     """Text of a packed file, or its first `most` bytes; other files as they are.
 
-    Of a workbook the one sheet that holds a table of numbers counts, as comma-separated values. Refused: damaged files,
-    more than :data:`MAX_BYTES` or :data:`MAX_CELLS`, a zip of several files, workbooks with no such sheet or several.
+    Of a workbook the sheet that `name` names counts (:func:`part_of`), else the one that holds a table of numbers, as
+    comma-separated values; so of a zip. Refused: damaged files, more than :data:`MAX_BYTES` or :data:`MAX_CELLS`, a zip
+    of several files, workbooks with no such sheet or several.
     """
     if most is None and len(raw) > MAX_BYTES:
         raise InputError(_too_large(name, f"{len(raw)} bytes"))
     if depth > _DEEPEST or not packed(raw[:4]):
+        if not depth and part_of(name)[1]:
+            raise InputError(Fault(name, "", "a sheet of a file that has none", "a workbook or a zip before the #"))
         return raw
     if raw[:2] == GZIP:
         text, damage = gunzip(raw, name, None if packed(gunzip(raw, name, 4)[0]) else most)
@@ -127,10 +143,23 @@ def _of_zip(archive: zipfile.ZipFile, raw: bytes, name: str, most: int | None, d
                     sum(map(len, blocks))
         return _workbook(raw, name, most)
     shown = [f for f in files if not f.startswith("__MACOSX/") and not f.rpartition("/")[2].startswith(".")]
-    if len(shown) != 1:
-        got = f"a zip of {len(shown)} files ({', '.join(shown[:4])}{', ...' if len(shown) > 4 else ''})"
-        raise InputError(Fault(name, "", got, "a zip of one file of measurements", "Unpack it and name the file"))
-    return unpacked(archive.read(shown[0]), name, most, depth + 1)
+    file, _ = part_of(name)
+    return unpacked(archive.read(_chosen(name, shown, shown, "files")), file, most, depth + 1)
+
+
+def _chosen(name: str, tables: Sequence[str], every: Sequence[str], what: str) -> str:
+    """Sheet or file that `name` names, else the only one that can be meant."""
+    file, part = part_of(name)
+    named = [one for one in every if part and part.lower() in (one.lower(), one.rpartition("/")[2].lower())]
+    found = named if part else tables
+    if len(found) == 1:
+        return found[0]
+    names = found or every
+    among = ", ".join(map(repr, names[:_SHOWN])) + (", ..." if len(names) > _SHOWN else "")
+    kind = what if what == "files" else f"{what} with a table of numbers"
+    got = f"no {part!r} among the {what} {among}" if part else f"{len(found) or 'no'} {kind} ({among})"
+    hint = f'Name it behind the file: "{file}#{(names or ["NAME"])[0]}"'
+    raise InputError(Fault(name, "", got, f"one of its {what}", hint))
 
 
 def _blocks(stream: IO[bytes]) -> Iterator[bytes]:
@@ -205,21 +234,17 @@ class _Extent:
 
 
 def _workbook(raw: bytes, name: str, most: int | None) -> bytes:
-    """The one sheet that is a table, as comma-separated values; lines keep their number in the sheet."""
+    """One sheet as comma-separated values; lines keep their number in the sheet."""
     from python_calamine import CalamineError, CalamineWorkbook
 
     try:
         book = CalamineWorkbook.from_filelike(io.BytesIO(raw))
-        sheets = {title: _csv(book.get_sheet_by_name(title).iter_rows(), name, most) for title in book.sheet_names}
+        wanted = [_chosen(name, (), book.sheet_names, "sheets")] if part_of(name)[1] else book.sheet_names
+        sheets = {title: _csv(book.get_sheet_by_name(title).iter_rows(), name, most) for title in wanted}
     except (CalamineError, zipfile.BadZipFile, OSError) as error:
         raise InputError(_damaged(name, error)) from error
-    tables = {title: text for title, (text, is_table) in sheets.items() if is_table}
-    if len(tables) != 1:
-        among = ", ".join(tables or sheets)
-        got = f"{len(tables)} sheets with a table of numbers ({among})" if tables else f"no table of numbers ({among})"
-        hint = "Keep one of them in the file, or save it as CSV"
-        raise InputError(Fault(name, "", got, "a workbook with one sheet of measurements", hint))
-    return next(iter(tables.values())).encode()[:most]
+    tables = [title for title, (_, is_table) in sheets.items() if is_table]
+    return sheets[_chosen(name, tables, list(sheets), "sheets")][0].encode()[:most]
 
 
 def _csv(rows: Iterator[list[Any]], name: str, most: int | None) -> tuple[str, bool]:

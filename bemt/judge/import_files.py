@@ -19,11 +19,12 @@ __all__ = ["import_"]
 
 @action(
     "Recordings", "import log.csv", words=("files",), command="import", shown=True,
-    common=("case", "picture", "rpm", "unit", "column", "sign", "zones", "out"),
+    common=("case", "rpm", "sheet", "unit", "column", "sign", "zones", "out"),
 )  # fmt: skip
 def import_(
-    files: File | Sequence[File], *, format: str | None = None, rpm: float | None = None,  # noqa: A002
-    period_s: float | None = None, revolutions: Count | None = None, case: Propeller | File | None = None,
+    files: File | Sequence[File], *, format: str | None = None, sheet: str | None = None,  # noqa: A002
+    rpm: float | None = None, period_s: float | None = None, revolutions: Count | None = None,
+    pole_pairs: Count | None = None, case: Propeller | File | None = None,
     picture: File | None = None, unit: Mapping[str, str] = {}, column: Mapping[str, str] = {},  # noqa: B006
     sign: Mapping[str, str] = {}, sector: Count | None = None, zones: Sequence[str] = (),  # noqa: B006
     axis: Literal["x", "y", "z"] | None = None, airspeed_m_s: float | None = None, density_kg_m3: float | None = None,
@@ -37,12 +38,16 @@ def import_(
         Files, or folders that a reader takes as a whole.
     format : str, optional
         Reader to use; detected from the content by default.
+    sheet : str, optional
+        Sheet of a workbook, or file in a zip; other commands take BOOK.xlsx#SHEET.
     rpm : float, optional
         Speed, for averages over whole revolutions. [rev/min]
     period_s : float, optional
         Duration of a revolution, instead. [s]
     revolutions : int, optional
         Average the last so many revolutions; 4, or half, by default.
+    pole_pairs : int, optional
+        Of the motor, where a speed counts electrical revolutions; 14 magnets are 7 pairs. Goes into recording.toml.
     case : Propeller, str or path, optional
         Say how the recordings lie in the prediction band of this case.
     picture : path, optional
@@ -99,21 +104,25 @@ def import_(
     if picture is not None and case is None:
         raise InputError(Fault("--picture", "", "no case", "--case CASE, whose band is drawn"))
     names, wrote, kept = paths_text("files", files, 1), "", ""
+    names = [f"{name}#{sheet}" for name in names] if sheet else names
     choice = asked(rpm, period_s, revolutions)
     load.check_format(format)
     told: dict[str, list[str]] = {"unit": words(unit), "column": words(column), "sign": words(sign)}
     run: dict[str, Any] = {"sector": sector, "zones": list(zones), "axis": axis, "airspeed_m_s": airspeed_m_s,
            "density_kg_m3": density_kg_m3, "reference": words(reference), "setup": words(setup)}  # fmt: skip
-    lines, insist = [], any(told.values()) or any(run.values()) or out is not None
+    lines, insist = [], any(told.values()) or any(run.values()) or bool(out is not None or pole_pairs)
     if insist and (table := _table(names, run)):
         from bemt.data.recordings.cfd_options import write_recording
 
         if out is None:
             hint = f"Add --out {Path(table).with_name('recording.toml').as_posix()}"
             raise InputError(Fault("", "--out", "nothing", "a recording.toml that keeps what you state", hint))
-        written = write_recording(table, os.fspath(out), told["unit"], told["column"], told["sign"]).as_posix()
+        stated = told["unit"], told["column"], told["sign"], pole_pairs
+        written = write_recording(table, os.fspath(out), *stated).as_posix()
         kept = written
         names, told, out, insist = [written], dict.fromkeys(told, []), None, False
+    elif pole_pairs:
+        raise InputError(Fault("", "--pole-pairs", f"{pole_pairs} with these files", "one table of measurements"))
     speed = None if choice.period is None else 60.0 / choice.period
     made = cfd_options.run_from(names, rpm=speed, revolutions=revolutions, **run, unit=told["unit"],
                                 column=told["column"], sign=told["sign"])  # fmt: skip

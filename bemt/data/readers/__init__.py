@@ -34,7 +34,7 @@ import numpy as np
 
 from bemt.base import plugins
 from bemt.base.errors import Fault, InputError, system_fault
-from bemt.base.packed import MAX_BYTES, packed, unpacked
+from bemt.base.packed import MAX_BYTES, packed, part_of, unpacked
 from bemt.base.toml_text import Collector
 
 __all__ = [
@@ -173,7 +173,7 @@ def _shown_code(head: bytes) -> str | None:
 def load_bytes(path: str | os.PathLike[str]) -> bytes:
     """Bytes of a file, or `InputError` with what the system says, or with its size if it is too large."""
     try:
-        with Path(path).open("rb") as stream:
+        with Path(part_of(path)[0]).open("rb") as stream:
             raw = stream.read(MAX_BYTES + 1)  # a device has no size
     except OSError as error:
         raise InputError(system_fault(error, os.fspath(path), "a readable file")) from error
@@ -362,9 +362,10 @@ def _unknown(target: Path, head: bytes, place: Collector) -> NoReturn:
 def _head(target: Path, place: Collector) -> bytes:
     """First bytes of a file, unpacked."""
     try:
-        with target.open("rb") as stream:
+        file, part = part_of(target)
+        with Path(file).open("rb") as stream:
             head = stream.read(HEAD_BYTES)
-        return unpacked(load_bytes(target), place.file, HEAD_BYTES) if packed(head) else head
+        return unpacked(load_bytes(target), place.file, HEAD_BYTES) if part or packed(head) else head
     except OSError as error:
         raise InputError(system_fault(error, place.file, "a readable file or folder")) from error
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from bemt.data.readers import head_text, load_text, number
 from bemt.data.readers._large import NumberTable, large_table
 from bemt.data.readers._words import NEUTRAL, english
-from bemt.data.readers.headings import Heading, heading, slug
+from bemt.data.readers.headings import Heading, counts_electrical, heading, slug
 from bemt.data.readers.recording import Builder
 from bemt.data.readers.samples import Channel
 from bemt.data.readers.split import (
@@ -141,6 +141,10 @@ def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
         text = f"{own!r} is not taken for the speed of the rotor; if it is, head it rpm, or write {line}"
         build.warnings.append(text)
     electrical(build)
+    if len(speeds) == 1 and counts_electrical(build.headings[speeds[0]]):
+        own = build.headings[speeds[0]]
+        build.warnings.append(f"{own!r} counts electrical revolutions: the speed of the rotor is that over pole pairs")
+        build.asks.append("--pole-pairs PAIRS")
     _several(build)
     build.check_magnitudes()
     loads = {"thrust_N", "torque_Nm"} & build.channels.keys()

@@ -230,6 +230,15 @@ def meanings(text: str) -> list[str]:
     return ["power" if name == "mechanical power" else name.replace(" ", "_") for name in found]
 
 
+def counts_electrical(text: str) -> bool:
+    """Tell whether a heading is a speed in electrical revolutions, over no pole pairs yet.
+
+    >>> [counts_electrical(t) for t in ("eRPM", "ESC speed (eRPM)", "Motor Electrical Speed (RPM)", "serpm")]
+    [True, True, False, False]
+    """
+    return re.search(r"(?<![a-z])e[-_ ]?rpm", text, re.IGNORECASE) is not None
+
+
 def may_be_shaft_speed(text: str) -> bool:
     """Tell whether the words of a heading fit a speed of rotation; its unit is not looked at.
 

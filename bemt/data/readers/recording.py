@@ -197,7 +197,8 @@ class Builder:
         if head.told:
             self.warnings.append(head.told)
         if head.unit is None:
-            if not CELLS.search(label.partition("[")[0].strip()):  # a count needs none
+            running = not head.text and np.array_equal(values, values[0] + np.arange(len(values)))  # as pandas writes
+            if not (running or CELLS.search(label.partition("[")[0].strip())):  # a count needs none
                 self.unitless.append(f"{label!r}" + (f" ({head.doubt})" if head.doubt else ""))
         elif head.unit.suffix != "rpm" and (head.unit.factor, head.unit.offset) != (1.0, 0.0):
             with np.errstate(over="ignore"):
@@ -343,7 +344,8 @@ class Builder:
             file = Path(self.table.source.name)
             out = shlex.quote(file.with_name("recording.toml").as_posix())
             step = f"bemt import {shlex.quote(file.as_posix())} {' '.join(asks)} --out {out}"
-            self.warnings.append(f"in one step, with your units in place of UNIT: {step}" if "UNIT" in step else step)
+            own = [f"your {what} in place of {mark}" for mark, what in _OWN.items() if mark in step]
+            self.warnings.append(f"in one step, with {' and '.join(own)}: {step}" if own else step)
         said = {**self.table.source.about, **(provenance or {})}
         flags: list[tuple[str, ...]] = [()] * len(self.table) if self.flags else []
         for row, words in self.flags.items():
@@ -354,6 +356,8 @@ class Builder:
         )  # fmt: skip
 
 
+_OWN = {"UNIT": "units", "PAIRS": "number"}
+"""What a user puts in place of a mark."""
 _PLAUSIBLE: dict[str, tuple[float, float, str]] = {
     "rpm": (150.0, 3e5, "rev/s, rad/s or electrical revolutions?"),
     "pulse_width_s": (5e-4, 3e-3, "Microseconds against milliseconds?"),
@@ -385,7 +389,7 @@ def _asked(headings: Sequence[str], channels: Iterable[str]) -> list[str]:
         found = set(meanings(name))
         found -= {"pulse_width"} if "throttle" in found else set()
         quantity = found.pop() if len(found) == 1 else ""
-        if quantity and not any(k.startswith(f"{quantity}_") for k in channels):
+        if quantity and not any(k == quantity or k.startswith(f"{quantity}_") for k in channels):
             out.setdefault(quantity, f"--unit {shlex.quote(name)}=UNIT")
     return list(out.values())
 

@@ -338,7 +338,13 @@ def _derive(build: Builder, pairs: int) -> None:
     if "electrical_rpm" in build.channels:
         label = build.free("rpm") if "rpm" not in build.channels else "rpm_from_electrical_rpm"
         build.channels[label] = Channel(build.channels["electrical_rpm"].values / pairs, "rpm")
-        build.warnings.append(f"{label} is electrical_rpm over {pairs} pole pairs, as the recording says")
+        less, more = (f"{100.0 * ((pairs + step) / pairs) ** 2 - 100.0:+.0f} %" for step in (-1, 1))
+        other = (
+            f"; were it {pairs - 1} or {pairs + 1}, CT would be {less} or {more}: count the magnets"
+            if pairs > 1
+            else ""
+        )
+        build.warnings.append(f"{label} is electrical_rpm over {pairs} pole pairs, as the recording says{other}")
     build.flag_time()
     if "time_s" in build.channels:
         build.flag_spikes("thrust_N", "torque_Nm", "rpm", "electrical_rpm", "optical_rpm")

@@ -15,7 +15,7 @@ import numpy as np
 
 from bemt.base.averaging import Average, Mean, keep_last, revolution_average
 from bemt.base.errors import Fault, InputError, refuse
-from bemt.base.packed import packed, unpacked
+from bemt.base.packed import packed, part_of, unpacked
 from bemt.base.tables import number_of
 from bemt.data.readers import load_bytes, polars_c81, uiuc
 from bemt.data.readers.apc import ApcPerformance
@@ -103,7 +103,7 @@ _IN_TEXT: tuple[_Mark, ...] = (
 def recognised(path: str | os.PathLike[str]) -> tuple[str, str] | None:
     """Identify a file that no reader takes: what it is, and a hint; None: the reason of the readers says it."""
     try:
-        with Path(path).open("rb") as stream:
+        with Path(part_of(path)[0]).open("rb") as stream:
             head = stream.read(16384)
         if packed(head):
             head = unpacked(load_bytes(path), os.fspath(path), 16384)
@@ -144,7 +144,7 @@ _DAMAGED = (
 
 def damaged_export(path: str | os.PathLike[str]) -> str | None:
     """Say which export a file was, when its body shows it and its head no longer does."""
-    with Path(path).open("rb") as stream:
+    with Path(part_of(path)[0]).open("rb") as stream:
         head = stream.read(16384)
     return next((name for mark, name in _DAMAGED if mark.search(head)), None)
 

@@ -169,7 +169,9 @@ class OpenRun:
             hint = f'--unit {quantity}="{usual}" if that is its unit; '
             hint += f'run.toml: [columns] {quantity} = {{ unit = "{usual}" }}'
             got = f"no unit ({c.unit!r} is none that is known)" if c.unit else "no unit"
-            self.fault(c, c.name, got, f"the unit of the {quantity}", hint)
+            expected = f"the unit of the {quantity}"
+            if not any((f.file, f.got, f.expected) == (c.file, got, expected) for f in self.faults):  # of all zones
+                self.fault(c, c.name, got, expected, hint)
             return None
         scale = unit.factor / (math.pi / 30.0) if quantity == "rpm" else unit.factor
         return np.asarray(c.record[c.name] * (1.0 if unit.suffix == "rpm" else scale))

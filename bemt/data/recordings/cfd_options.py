@@ -15,15 +15,16 @@ from bemt.base.tables import write_atomic
 from bemt.base.toml import validated
 from bemt.base.toml_text import Collector
 from bemt.data import readers
-from bemt.data.readers import load_text, number
+from bemt.data.readers import generic_csv, load_text, number
 from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import QUANTITIES, ReferenceTable, RunHead, RunToml, SetupTable, toml_text
-from bemt.data.readers.headings import heading, meanings
+from bemt.data.readers.headings import counts_electrical, heading, meanings
 from bemt.data.readers.recording_toml import QUANTITIES as CHANNELS
 from bemt.data.readers.recording_toml import RecordingToml
 from bemt.data.readers.split import decimal_mark, some, split_table
 from bemt.data.readers.unit_text import TWO_MEANINGS, unit_for
 from bemt.data.recordings.cfd_loads import DUCT
+from bemt.data.recordings.channels import named
 
 Facts = dict[str, str | int]
 """What options say of one quantity: ``column``, ``unit``, ``sign``."""
@@ -252,6 +253,7 @@ class _Measured:
 
     known: Sequence[str]
     taken: dict[str, str] = field(default_factory=dict)  # heading that --column named, its quantity
+    read_as: Mapping[str, str] = field(default_factory=dict)  # quantity that the reader took a heading for
 
     def column(self, name: str, text: str) -> tuple[str, Facts] | Fault:
         """``--column QUANTITY=HEADING``."""
@@ -295,6 +297,14 @@ class _Measured:
                 out.setdefault(told[0], {"column": h})
         return out
 
+    def electrical(self, facts: Facts) -> dict[str, Facts]:
+        """Column that counts electrical revolutions: that of the rpm, else the one whose heading says so."""
+        speeds = {h: u for h in self.known if (u := heading(h).unit) is not None and u.dimension == "angular_speed"}
+        said = [h for h in speeds if counts_electrical(h)] or list(speeds)
+        if "column" not in facts and len(said) == 1:
+            facts = {"column": said[0], "unit": speeds[said[0]].suffix, **facts}
+        return {"electrical_rpm": facts}
+
     def _by_unit(self, name: str, text: str) -> str | None:
         """Quantity that the words of a heading mean and the unit goes with, else the one that a unit stands for."""
         stated = unit_for("", text)
@@ -305,6 +315,7 @@ class _Measured:
         """Add the column and the unit that the headings tell; faults where they do not."""
         if "column" not in facts:
             named = [h for h in self.known if quantity in meanings(h)]
+            named = named if len(named) == 1 or quantity not in self.read_as else [self.read_as[quantity]]
             if len(named) != 1:
                 expected = f"--column {quantity}=HEADING with one of {some(map(repr, named or self.known), 12)}"
                 yield Fault("", "--column", f"no column for {quantity}", expected)
@@ -319,13 +330,25 @@ class _Measured:
             facts["unit"] = found.suffix
 
 
+def _read_as(file: str) -> dict[str, str]:
+    """Heading of each quantity as the reader of tables understands it."""
+    try:
+        found = named(generic_csv.read(file))
+    except InputError:
+        return {}
+    own: Mapping[str, str] = found.provenance["names"]
+    return {units.split_suffix(name)[0]: found.headings[was] for name, was in own.items() if was in found.headings}
+
+
 def write_recording(
-    file: str, out: str, unit: Iterable[str] = (), column: Iterable[str] = (), sign: Iterable[str] = ()
-) -> Path:
+    file: str, out: str, unit: Iterable[str] = (), column: Iterable[str] = (), sign: Sequence[str] = (),
+    pole_pairs: int | None = None,
+) -> Path:  # fmt: skip
     """Write a recording.toml beside a table of measurements, in the same folder; all faults of the options at once.
 
-    `unit` ``NAME=UNIT``, of a quantity or a heading; `column` ``QUANTITY=HEADING``; `sign` ``QUANTITY=-1``. InputError
-    on what is no column, unit or quantity, and where `out` exists.
+    `unit` ``NAME=UNIT``, of a quantity or a heading; `column` ``QUANTITY=HEADING``; `sign` ``QUANTITY=-1``;
+    `pole_pairs` of a speed that counts electrical revolutions. InputError on what is no column, unit or quantity, and
+    where `out` exists.
     """
     import tomlkit
 
@@ -336,23 +359,29 @@ def write_recording(
     if path.exists():
         faults.append(Fault(path.as_posix(), "", "a file that exists", "a new name", "Add the lines to it by hand"))
     table = split_table(load_text(file))
-    headings = _Measured([h for h in table.headings if h])
+    headings = _Measured([h for h in table.headings if h], {}, _read_as(file))
+    loads = [q for q in ("thrust", "torque") if q in headings.read_as]
+    if loads and list(sign) in (["-1"], ["1"]):  # turns all
+        sign = [f"{q}={text}" for q in loads for text in sign]
     columns: dict[str, Facts] = {}
     _gather("--column", column, headings.column, columns, faults)
     _gather("--unit", unit, headings.unit, columns, faults)
     _gather("--sign", sign, headings.sign, columns, faults)
     if not (columns or faults):
         columns = headings.plain()
+    if pole_pairs:
+        columns |= {} if "electrical_rpm" in columns else headings.electrical(columns.pop("rpm", {}))
     for quantity, facts in columns.items():
         faults += headings.complete(quantity, facts)
     refuse(faults)
     head = {"file": Path(file).name} | ({"decimal": ","} if decimal_mark(table) == "," else {})
     out_faults = Collector(os.fspath(path))
-    validated(RecordingToml, {"recording": head, "columns": columns}, out_faults)
+    rotor = {"rotor": {"pole_pairs": pole_pairs}} if pole_pairs else {}
+    validated(RecordingToml, {"recording": head, "columns": columns, **rotor}, out_faults)
     out_faults.check()
     inline = {name: tomlkit.inline_table() for name in columns}
     for name, facts in columns.items():
         inline[name].update(facts)
-    document = {"recording": head, "columns": inline}
+    document = {"recording": head, "columns": inline, **rotor}
     write_atomic(path, "# Written by bemt import. Give this file in place of the table.\n" + tomlkit.dumps(document))
     return path

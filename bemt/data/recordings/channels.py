@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from bemt.base import units
 from bemt.base.arrays import Array
 from bemt.base.tables import number_of
-from bemt.data.readers.headings import USUAL
+from bemt.data.readers.headings import USUAL, counts_electrical
 from bemt.data.readers.recording import FULL_THROTTLE
 from bemt.physics.dataset import Dataset
 
@@ -181,7 +181,9 @@ def _speed(d: Dataset, values: dict[str, Array], names: dict[str, str], notes: l
     if "rpm" in values:
         return
     for name in _SPEEDS:
-        if name in values and _alive(values[name]):
+        if d.format == "table" and counts_electrical(d.headings.get(names.get(name, ""), "")):
+            notes.append(f"{name} is no speed of the rotor until it is divided by the pole pairs")
+        elif name in values and _alive(values[name]):
             values["rpm"], names["rpm"] = values[name], names[name]
             how = "" if name == "optical_rpm" else ": right only if the pole count set in the stand was right"
             notes.append(f"rpm is {name}{how}")

@@ -78,6 +78,8 @@ def duplicates(facts: Facts) -> Iterator[Finding]:
             ratio = _same(one, two)
             if ratio is None or b.startswith(a + "_") and b[len(a) + 1 :].isdigit():
                 continue  # a column in two units is compared by the importer
+            if a == "electrical_rpm" and "rpm" in b and abs(1.0 / ratio - max(2, round(1.0 / ratio))) < 1e-6:
+                continue  # divided by the pole pairs, no second sensor
             equal = ratio == 1.0 and facts.unit.get(a) == facts.unit.get(b) == ""
             if sensors or equal:
                 text = f"the same numbers as {a}" + ("" if ratio == 1.0 else f" times {ratio:.6g}")

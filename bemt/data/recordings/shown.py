@@ -39,6 +39,7 @@ _LOADS = {"thrust_N", "torque_Nm", "CT", "CP"}
 SHOWN = ("run", "pwm_s", "throttle", "rpm", "airspeed_m_s", "J", "thrust_N", "torque_Nm", "power_W",
          "electrical_power_W", "CT", "CP", "eta", "FM")  # fmt: skip
 """Channels of the table of points, as far as they are there."""
+_ROWS = 20  # channels on one screen
 MOST = 40
 """Points shown; JSON has all."""
 
@@ -96,6 +97,14 @@ def points_text(reduced: Dataset | str) -> list[str]:
         tables.text_table(list(columns), rows, (len(columns) - 1,), "    "),
         *_dropped(how), *(f"  shared by all points, {text}" for text in shared), *(f"  . {t}" for t in reduced.notes),
     ]  # fmt: skip
+
+
+def _curve(record: Dataset) -> list[str]:
+    """Rows of coefficients, which are points as they stand."""
+    shown = [k for k in (*SHOWN, "CQ") if k in record.values]
+    rows = [[_cell(k, record[k][i], 5) for k in shown] for i in range(min(len(record), MOST))]
+    many = f"  the first {MOST} of {len(record)} rows:" if len(record) > MOST else f"  {len(record)} rows:"
+    return [many, tables.text_table(shown, rows, (), "    ")]
 
 
 def _cell(name: str, value: float, digits: int) -> str:
@@ -163,13 +172,18 @@ class ImportedFile:
         ]
         errors = [text for f, text in zip(self.findings, told, strict=True) if f.severity == "error"]
         lines, rows, plain = [self.title, *errors], [], []
+        curve = self.reduced is None and not self.record.clock and bool({"CT", "CP", "CQ"} & self.record.values.keys())
         for name in self.record.values:
-            unit, found = self.record.unit(name), self.means.get(name)
-            if found is None or not math.isfinite(found.value):
+            unit, found = self.record.unit(name).replace("_", "/"), self.means.get(name)  # SI: m_s, rad_s
+            if curve or found is None or not math.isfinite(found.value):
                 plain.append(f"{name} [{unit}]" if unit not in ("", "-", "1") else name)
                 continue
             drift = "-" if found.drift is None else f"{found.drift:+.2%}"
             rows.append([name, unit or "-", tables.number_text(found.value, 6), drift, found.over])
+        if len(rows) > _ROWS:  # of a report by zones the sums, with their parts in JSON
+            sums = [row for row in rows if "_total_" in row[0]] or rows[:_ROWS]
+            lines.append(f"  {len(sums)} of {len(rows)} channels (--json has all):")
+            rows = sums
         if rows:
             lines.append(
                 tables.text_table(["channel", "unit", "mean", "drift", "averaged over"], rows, (0, 1, 4), "  ")
@@ -177,7 +191,7 @@ class ImportedFile:
         if plain:
             lead = "  not averaged: " if rows else "  channels: "
             lines.append(textwrap.fill(", ".join(plain), 110, initial_indent=lead, subsequent_indent="    "))
-        lines += points_text(self.reduced) if self.reduced is not None else []
+        lines += points_text(self.reduced) if self.reduced is not None else _curve(self.record) if curve else []
         lines += [f"  ! {text}" for text in self.warnings]
         lines += [text for text in told if text not in errors]
         return "\n".join(lines)

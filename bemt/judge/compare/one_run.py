@@ -31,7 +31,7 @@ from bemt.physics.dataset import Dataset
 from bemt.rotors.as_measured import FACTOR
 from bemt.rotors.case import Case
 from bemt.rotors.case.prepare import prepare_case
-from bemt.rotors.case.propagate import propagate
+from bemt.rotors.case.propagate import Moved, propagate
 from bemt.rotors.conditioning import STAND
 from bemt.rotors.propeller import rotor_of
 
@@ -160,14 +160,19 @@ def compare_run(
     if not rows.size:
         raise InputError(Fault(name, "", "no point with a speed and a load", "one or more"))
     step = None if progress is None else (lambda i, n, what: progress(f"{what} ({i}/{n})"))
-    solved = propagate(
+    whole = propagate(
         made, full["rpm"][rows], full["airspeed_m_s"][rows], full["density_kg_m3"][rows],
         angle_deg=_angle(full, rows, made, name), progress=step,
-    ).points  # fmt: skip
+    )  # fmt: skip
+    solved = whole.points
     computed = imported.kind == "cfd" or bool(conditions_of(imported))
     if not computed and (open_u := [k for k in STAND_U if k in full and np.isnan(full.u[k][rows]).any()]):
         usual = ", ".join(f"{k.rsplit('_', 1)[0]} {STAND_U[k]:.0%}" for k in open_u)
-        notes.insert(0, f"u of the recording: not stated; that of a stand which nobody calibrated, {usual}")
+        notes.insert(
+            0,
+            f"u of the recording: not stated; that of a stand which nobody calibrated, {usual} "
+            "(a table of CFD says so by a column turbulence, cells or solver)",
+        )
         stand = {k: np.where(np.isnan(full.u[k]), STAND_U[k] * np.abs(full[k]), full.u[k]) for k in open_u}
         full = replace(full, u={**full.u, **stand})
     out = tuple(_point(full, solved, int(i), k) for k, i in enumerate(rows))
@@ -190,7 +195,7 @@ def compare_run(
         name, made.name, "cfd" if computed else "bench", {k: ", ".join(v) for k, v in conditions_of(imported).items()},
         out, tuple(faults_first(lines)), known, dict(imported.averaged) if is_run(imported) else {},
         tuple(dict.fromkeys(notes)), _sentence(out, "CFD" if computed else "Recording", open_units(imported)),
-        _next(out, lines, name, asked),
+        _next(out, lines, name, asked, whole.moved),
     )  # fmt: skip
 
 
@@ -286,7 +291,9 @@ def _sentence(points: Sequence[PointOfRun], who: str, units_open: Collection[str
         share = f" in {len(off)} of {len(every)} values" if len(every) > 1 else ""
         near_zero = abs(load.cfd) < _NEAR_ZERO * top[k]  # there the value is no measure of the difference
         share_of = f"{100.0 * load.difference / top[k]:+.0f} % of the largest" if near_zero else load.percent
-        size = f"{_LOADS[k].split(' [')[0]} of BEMT is {share_of}"
+        at = next(p for p in points if load in p.loads.values())
+        where = f" at {speed_text(at.rpm)} rev/min, {number_text(at.airspeed_m_s, 4)} m/s" if len(points) > 1 else ""
+        size = f"{_LOADS[k].split(' [')[0]} of BEMT is off by {share_of}{where}"
         return f"{who} and BEMT differ{share}: {size}, {load.times:.1f} times both bands together.{tail}"
     if near:
         worst = dict(sorted(near, key=lambda item: abs(item[1].difference)))  # of each load the farthest
@@ -302,9 +309,27 @@ def _sentence(points: Sequence[PointOfRun], who: str, units_open: Collection[str
     return f"{who} and BEMT agree within both bands.{tail}"
 
 
-def _next(points: Sequence[PointOfRun], audit: Sequence[AuditLine], name: str, case: str) -> str:
+def _narrower(points: Sequence[PointOfRun], moved: Sequence[Moved]) -> str:
+    """What most of both bands is, where they hide any difference: the unknown, or the spread of rotors as built."""
+    key, load = next(iter(points[0].loads.items()))
+    by, both = load.u_bemt_by, load.u_both
+    widest = max(moved, key=lambda one: float(np.nan_to_num(one.u[key][0])), default=None) if key in _KIND else None
+    differs = any(v.verdict not in ("agrees", "within 2 u") for p in points for v in p.loads.values())
+    if differs or widest is None or max(by.values(), default=0.0) < load.u_cfd:
+        return ""
+    if by.get("input", 0.0) >= by.get("model", 0.0):
+        part, what = float(widest.u[key][0]), f"{widest.unknown.key} measured and stated in the case"
+    else:
+        part, what = by["model"], "a clean run of this rotor on a stand, for `bemt lab calibrate-rotor`"
+    rest, unit = math.sqrt(max(both**2 - part**2, 0.0)), _LOADS[key].split("[")[1].rstrip("]")
+    return f"{what}: both bands together go from {number_text(both, 2)} to {number_text(rest, 2)} {unit} at best"
+
+
+def _next(
+    points: Sequence[PointOfRun], audit: Sequence[AuditLine], name: str, case: str, moved: Sequence[Moved]
+) -> str:
     """What would tell more."""
-    steps = []
+    steps = [step] if (step := _narrower(points, moved)) else []
     name, case = shlex.quote(name), shlex.quote(case)
     if any(line.topic == "grid study" and line.status in ("fault", "not stated") for line in audit):
         steps.append("the same point on a finer grid (cells x 2 or more): its change is the u of the grid")
@@ -321,7 +346,10 @@ def text(found: RunComparison, details: bool = False) -> str:
     set_up = _set_up(found.conditions)
     who, bare = ("CFD", "set-up not stated") if found.kind == "cfd" else ("recorded", "a recording")
     lines = [_filled(found.sentence), "", f"{Path(found.run).name} ({set_up or bare}) and case {found.case}"]
-    shown = found.points if details else found.points[:_ROWS]
+    shown = found.points if details or len(found.points) <= _ROWS else found.points[: _ROWS - 1]
+    if shown is not found.points:  # and the one of the largest difference behind them, or the next
+        rest = found.points[_ROWS - 1 :]
+        shown = (*shown, max(rest, key=lambda p: max(float(np.nan_to_num(v.times)) for v in p.loads.values())))
     rows = []
     for p in shown:
         head = [speed_text(p.rpm), number_text(p.airspeed_m_s, 4)]

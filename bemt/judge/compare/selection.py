@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.units import KNOT, MPH, RPM, ZERO_CELSIUS, split_suffix
-from bemt.data.readers.headings import may_be_shaft_speed, surely_shaft_speed
+from bemt.data.readers.headings import counts_electrical, may_be_shaft_speed, surely_shaft_speed
 from bemt.data.recordings.channels import MEASURED, in_one_step, moves, named
 from bemt.data.recordings.findings import zero_thrust_speed
 from bemt.physics.air import AIR_C, Air
@@ -240,8 +240,11 @@ def speed_in_doubt(imported: Dataset, path: str) -> None:
         elif unit == "rpm" or (unit == "rad_s" and may):
             line = f'[columns] rpm = {{ column = "{heading[name]}", unit = "{unit}" }}'
             hint = f"If it is the speed of this rotor, head it rpm, or write in recording.toml: {line}"
-            hint += "; electrical_rpm with pole_pairs if it counts electrical revolutions"
             got, expected = f"a speed under a name of its own ({name})", "one column that is the speed of the rotor"
+            if counts_electrical(heading[name]):
+                got, hint = "electrical revolutions", "The speed of the rotor is that over the pole pairs"
+            else:
+                hint += "; electrical_rpm with pole_pairs if it counts electrical revolutions"
             faults.append(Fault(path, f"column {heading[name]}", got, expected, hint))
     for name, cells in imported.texts.items():
         if may_be_shaft_speed(heading[name]) and sum(cell.strip()[:1].isdigit() for cell in cells) > len(cells) / 2:

@@ -349,7 +349,7 @@ def _guess(d: Diagnosis) -> str:
     chance = d.found.probability.get(Explanation.of(*d.best.ids), 0.0) if d.best.ids else 0.0
     if chance < max(_GUESS, d.found.probability[UNKNOWN], d.found.probability[NONE]):
         return ""
-    return f"; best guess: {' and '.join(_title(i) for i in d.best.ids)} (probability {chance:.2f})"
+    return f"; {' and '.join(_title(i) for i in d.best.ids)} is likeliest ({chance:.2f}), too little to be named"
 
 
 def _ratios(d: Diagnosis) -> list[tuple[str, float]]:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemt.base.errors import Fault, InputError, gathered, refuse
+from bemt.base.packed import part_of
 from bemt.base.units import ZERO_CELSIUS
 from bemt.data.readers.headings import surely_shaft_speed
 from bemt.data.recordings.channels import file_name, named, stated
@@ -328,7 +329,7 @@ def _there(path: Any) -> None:
         if not is_table(path):
             expected = "a path, a Dataset or a DataFrame"
             raise InputError(Fault("", "recordings", f"{type(path).__name__} {path!r:.40}", expected))
-    elif not Path(path).exists():
+    elif not Path(part_of(path)[0]).exists():
         raise InputError(Fault(path, "", "no such file or folder", "a recording", "Check the path"))
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from bemt.base.errors import Fault, InputError
 
 if TYPE_CHECKING:
-    from bemt.results.report.book import Book, Page
+    from bemt.results.report.book import Book, Page, Part
 
 __all__ = ["HTML_NAME", "MARKDOWN_NAME", "book_html", "write"]
 
@@ -25,13 +25,14 @@ HTML_NAME, MARKDOWN_NAME = "report.html", "report.md"
 def _pages(book: Book) -> Iterator[Page]:
     """Pages in the order of the menu."""
     from bemt.results.report.book import Page, sections
-    from bemt.results.report.case_page import case_sections
+    from bemt.results.report.case_page import case_sections, opening
     from bemt.results.report.diagnosis_block import diagnosis_parts, headline, page_verdict
     from bemt.results.report.front import answers, front_parts
 
     names = [page.result.name for page in book.cases]
     ids = [f"case-{i + 1}-" + re.sub(r"[^A-Za-z0-9_-]+", "-", name)[:60] for i, name in enumerate(names)]
-    yield Page("front", "Answers", "Answers", front_parts(book, ids), [], answers(book, ids))
+    first: list[Part] = [("figures", opening(book.cases[0]))] if len(book.cases) == 1 else []
+    yield Page("front", "Answers", "Answers", [*first, *front_parts(book, ids)], [], answers(book, ids))
     for case, name, key in zip(book.cases, names, ids, strict=True):
         said = "verdict", page_verdict(case)
         yield Page(key, name[:40], headline(case.result), [said], case_sections(case))

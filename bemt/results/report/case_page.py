@@ -109,10 +109,27 @@ def _inputs(page: CasePage) -> Section:
     ]
 
 
+def opening(page: CasePage) -> list[Any]:
+    """First pictures of a report on one case: recording and prediction, else thrust over speed and CT over J."""
+    told = first_pictures(page.diagnosis) if page.diagnosis else []
+    curves = _curves(page)
+    return told or [figure(curves[k]) for k in (len(LABELS), 0) if curves]
+
+
 def _performance(page: CasePage) -> Section:
+    words = (
+        "Bands: one standard uncertainty from the declared assumptions and from the model on real rotors. "
+        "Points: recorded values; a value without a bar states no uncertainty."
+    )
+    curves = _curves(page)
+    return ("Performance", [("words", words), ("figures", [figure(p) for p in curves])]) if curves else ("", [])
+
+
+def _curves(page: CasePage) -> list[Plot]:
+    """Coefficients over J, then thrust, power and their ratio over the speed of rotation."""
     result, c = page.result, page.curves
     if c is None:
-        return "", []
+        return []
     own, j, w = result.at, c.over_J, c.over_rpm
     plots = []
 
@@ -146,11 +163,7 @@ def _performance(page: CasePage) -> Section:
         traces = [Trace("BEMT", w.rpm, y, u), *more, *seen]
         title = f"{title} at {own.airspeed_m_s:g} m/s"
         plots.append(Plot(title, "rotational speed [rev/min]", label, traces, x_zero=True))
-    words = (
-        "Bands: one standard uncertainty from the declared assumptions and from the model on real rotors. "
-        "Points: recorded values; a value without a bar states no uncertainty."
-    )
-    return "Performance", [("words", words), ("figures", [figure(p) for p in plots])]
+    return plots
 
 
 def _radial(page: CasePage) -> Section:

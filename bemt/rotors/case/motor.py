@@ -168,7 +168,8 @@ def named_motor(name: str, where: str = "--motor") -> NamedMotor:
     if len(fewest) != 1:
         names = ", ".join(one.name for _, one in found[:8])
         got = f"{name!r}, which {'no motor has' if not found else f'{len(found)} motors have'}"
-        raise InputError(Fault(where, "", got, "the name of one motor", f"Such as {names}" if names else ""))
+        hint = f"Such as {names}" if names else "How many there are: --rotors" if name.isdigit() else ""
+        raise InputError(Fault(where, "", got, "the name of one motor", hint))
     return fewest[0]
 
 

@@ -10,8 +10,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bemt.base.errors import Fault, InputError, refuse
+from bemt.base.packed import part_of
 from bemt.base.tables import write_atomic
 from bemt.base.units import INCH
+from bemt.data.readers import load_text
 from bemt.data.readers.uiuc_names import find_family
 from bemt.rotors.case import Case, fresh, from_solid, load_case
 from bemt.rotors.case.motor import full_speed
@@ -205,10 +207,13 @@ def _files(w: Wanted) -> dict[str, bytes]:
         D = (w.diameter_mm or 0.0) * 1e-3 if told is None or w.diameter_mm is not None else told.diameter_in * INCH
         hub, key, table = fresh.of_stations(file, D)
         blades = w.blades or (told.blades if told else None) or 2
+        part = part_of(file)[1]  # of a workbook that sheet is kept, as text
+        kept = f"{re.sub(r'[^A-Za-z0-9]+', '_', part)}.csv" if part else file.name
+        held = load_text(file).text.encode() if part else file.read_bytes()
         text = fresh.stations_text(
-            file.name, D, blades, w.rpm, w.airspeed_m_s, hub, key, told, w.family, w.motor, name, table
+            kept, D, blades, w.rpm, w.airspeed_m_s, hub, key, told, w.family, w.motor, name, table
         )
-        return {file.name: file.read_bytes(), "case.toml": text.encode()}
+        return {kept: held, "case.toml": text.encode()}
     return {"case.toml": _label_text(w, w.label or "").encode()}
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from bemt.base import canvas
 from bemt.base.action import as_html
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
-from bemt.base.tables import csv_text, json_text, number_text, text_table, write_atomic
+from bemt.base.tables import csv_text, json_text, number_of, number_text, text_table, write_atomic
 from bemt.rotors.case.motor import LIST, motors_on_sale
 from bemt.tools.design.search import Target
 
@@ -84,7 +84,9 @@ class DriveChoice:
         size = "" if t.airspeed_m_s == 0.0 else f" at {t.airspeed_m_s:g} m/s"
         fluid = "" if t.fluid == "air" else ", in water"
         pair = ", each one of a coaxial pair" if t.coaxial else ""
-        what = f"{t.thrust_N:.3g} N" if t.mass_kg is None or t.fixed else f"{t.mass_kg:.3g} kg on {t.rotors} rotors"
+        what = f"{t.thrust_N:.3g} N"
+        if t.mass_kg is not None and not t.fixed:
+            what = f"{t.mass_kg:.3g} kg on {number_of(t.rotors, 'rotor')}"
         lines = [
             *self._headline(at),
             *self._at_an_end(),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -275,7 +276,7 @@ def export_cases(
 def _nearest(word: str) -> str:
     """What a word that is no target may have meant: one spelt alike, or those that speak of it."""
     known = exports()
-    about = [name for name, t in known.items() if word.lower() in f"{t.title} {t.source}".lower()]
+    about = [name for name, t in known.items() if re.search(rf"\b{re.escape(word)}", f"{t.title} {t.source}", re.I)]
     words = f"For {word}: {' or '.join(about)}" if len(word) > 2 and about else ""
     return absent_target(word) or did_you_mean(word.lower(), known).strip() or words
 

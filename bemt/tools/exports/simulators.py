@@ -25,7 +25,7 @@ class GazeboExport(LoadsExport):
     """The plugin block of gz-sim; the older gazebo plugins take the same constants."""
 
     id = "gazebo"
-    title = "Gazebo multicopter motor model (SDF)"
+    title = "Gazebo multicopter motor model (SDF; for ROS and ROS 2)"
     holds = (
         "T = motorConstant W^2, Q = momentConstant T, H = rotorDragCoefficient W V_xy, roll moment "
         "rollingMomentCoefficient W V_xy; no airspeed, density baked in"

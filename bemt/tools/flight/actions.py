@@ -329,7 +329,8 @@ def _with_model(answer: FlightAnswer, case: str) -> FlightAnswer:
 
 _HEADINGS = (
     "file", "format", "rotors", "flying_s", "verdict", "effects", "look", "thrust_constant", "thrust_constant_half",
-    "thrust_constant_unit", "mass_kg", "mass_half_kg", "hover_command", "sensors", "vibration_m_s2", "wind_m_s",
+    "thrust_constant_unit", "thrust_over", "mass_kg", "mass_half_kg", "hover_command", "sensors", "vibration_m_s2",
+    "wind_m_s",
 )  # fmt: skip
 
 
@@ -353,6 +354,7 @@ def _row(a: FlightAnswer) -> dict[str, Any]:
         "thrust_constant": None if k is None else rounded(k.value),
         "thrust_constant_half": None if k is None else rounded(k.half),
         "thrust_constant_unit": None if k is None else k.unit,
+        "thrust_over": None if k is None else "speed^2" if "thrust constant" in a.found.constants else "command",
         "mass_kg": None if a.mass is None else rounded(a.mass.value),
         "mass_half_kg": None if a.mass is None else rounded(a.mass.half),
         "hover_command": None if hover is None else rounded(hover.value),
@@ -363,12 +365,13 @@ def _row(a: FlightAnswer) -> dict[str, Any]:
 
 def _aligned(rows: Sequence[dict[str, Any]]) -> str:
     """The columns that a screen holds."""
-    heads = ("file", "rotors", "in the air", "verdict", "thrust constant", "sensor")
+    heads = ("file", "rotors", "in the air", "verdict", "thrust over", "sensor")
     cells = [heads]
     for r in rows:
         k = r["thrust_constant"]
         half = "" if k is None else f"{100 * r['thrust_constant_half'] / k:.1f} %"
         constant = "" if k is None else f"{k:.4g} ± {half} {r['thrust_constant_unit']}"
+        constant = constant and f"{r['thrust_over']}: {constant}"
         what = f"{r['verdict']}: {r['effects']}" if r["effects"] else r["verdict"]
         sensor = "" if not r["sensors"] else r["sensors"].removeprefix("The speed sensor of ")
         seconds = f"{r['flying_s'] or 0.0:.0f} s"
