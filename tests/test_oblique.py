@@ -19,6 +19,7 @@ from bemt.physics.effects import Effect, standard
 from bemt.physics.effects.flapping import Flapping
 from bemt.physics.sections.neuralfoil import neuralfoil_polar
 from bemt.physics.sections.polars import linear_polar
+from bemt.rotors.case import propagate
 from geometry.airfoil import naca4
 from geometry.laws import helix
 from geometry.rotor import Blade, Rotor
@@ -138,6 +139,17 @@ def test_bands_and_flags_of_oblique_points() -> None:
     assert not any("oblique" in word for word in found.flags[0]) and any("oblique" in word for word in found.flags[1])
     assert found["sideslip_rad"][1] == pytest.approx(np.radians(30.0))
     assert np.array_equal(found.airspeed_m_s, [8.0, 8.0])
+
+
+def test_bands_from_the_roots_of_the_rotor_as_drawn_are_those_of_full_solutions(monkeypatch: pytest.MonkeyPatch) -> None:
+    angle, V = (v.ravel() for v in np.meshgrid([10.0, 45.0, 90.0, 150.0], [2.0, 6.0, 12.0]))
+    near = bemt.propeller("9x6").solve(6000, V, angle_deg=angle)
+    monkeypatch.setattr(propagate, "Near", lambda: None)
+    full = bemt.propeller("9x6").solve(6000, V, angle_deg=angle)
+    for q in ("CT", "CP"):
+        assert np.array_equal(near[q], full[q])
+        np.testing.assert_allclose(near.u_by["input"][q], full.u_by["input"][q], rtol=0.03)
+        np.testing.assert_allclose(near.u[q], full.u[q], rtol=0.02)
 
 
 def test_measured_propeller_at_30_deg(shared_data: Path) -> None:

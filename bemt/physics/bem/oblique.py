@@ -88,6 +88,7 @@ PITT_PETERS = 15.0 * math.pi / 32.0
 _TOL = 1e-7  # the last secant step [rad]
 _MAX = 120
 _MAX_FLAP = 30
+_THERE = 1e-6  # so near a root is at it [rad]
 _NEAR, _STEPS = 3e-3, 4  # the loads' secant goes on to a root so near [rad] after so many steps at most [1]
 
 
@@ -285,7 +286,7 @@ def _point(lookup, point, st, tab, par, cs, sn, few_cs, few_sn, R, out, hub, dis
         out[O_STAGNANT] += 1.0 if q * FM > F * math.sqrt(s * s + (Vy / W) ** 2) else 0.0
         if roots.shape[0] > 0 and not zone:
             roots[i, 0] = phi - atan2(UP, UT)
-            roots[i, 1] = last_slope
+            roots[i, 1] = last_slope if st[i, S_SIGMA] > 0.0 else 1.0
         alpha = st[i, S_BETA] - phi
         step_alpha = alpha - last_alpha
         step_alpha = step_alpha if abs(step_alpha) < 0.1 else 0.0
@@ -363,7 +364,9 @@ def _near(lookup, point, roots, st, tab, par, cs, sn, R, skip, out):
                 if abs(left) < _NEAR:
                     break
             step = -res / slope
-            step = step if abs(step) > 1e-6 else 1e-6
+            if abs(step) < _THERE:
+                left, share = 0.0, 0.0
+                break
         if not (abs(left) < _NEAR):
             out[O_WHERE] = 0.0
         scale = 0.5 * point[P_RHO] * st[i, S_CHORD] * st[i, S_DR] * B * skip / n
@@ -477,15 +480,15 @@ def _whole(points: Array) -> Array:
     return np.ascontiguousarray(np.pad(points, ((0, 0), (0, N_POINT - points.shape[1]))))
 
 
-SKIP = 3
+SKIP = 4
 """One of so many annuli is solved of a rotor that is near another one [1]."""
 
 
 class Near:
     """Loads of rotors that are like one that is solved, at the same points: secant steps from its roots.
 
-    The first rotor is solved in full. Others add to its loads what these steps change, in every `SKIP`-th
-    annulus where they have as many as it; where the steps end at no root, the point is solved in full.
+    The first rotor is solved in full. Others add to its loads what these steps change, in every `SKIP`-th annulus where
+    they have as many as it; where the steps end at no root, the point is solved in full.
     """
 
     def __init__(self) -> None:
@@ -502,7 +505,7 @@ class Near:
             return self._whole.copy(), hub
         skip = SKIP if st.shape[0] == self._roots.shape[1] else 1
         found, own = self._step(layout, points, *given, R, skip), self._own[skip]
-        far = (own[:, O_WHERE] >= 0.0) | (found[:, O_WHERE] >= 0.0) | ~np.isfinite(found[:, O_T])
+        far = (self._own[1][:, O_WHERE] >= 0.0) | (found[:, O_WHERE] >= 0.0) | ~np.isfinite(found[:, O_T])
         out, hub = self._whole.copy(), np.full((points.shape[0], 4), np.nan)
         for k in (O_T, O_Q, O_MASS):
             out[:, k] += found[:, k] - own[:, k]
@@ -513,7 +516,6 @@ class Near:
     def _step(self, layout: str, points: Array, st: Array, tab: Array, par: Array, R: float, skip: int) -> Array:
         few = azimuths(AZIMUTHS // 2)
         out = np.empty((points.shape[0], K.N_OUT))
-        ready(_ENTRIES[layout][1])(
-            _whole(points), self._roots, st, tab, par, np.cos(few), np.sin(few), R, skip, out
-        )
+        entry = ready(_ENTRIES[layout][1])
+        entry(_whole(points), self._roots, st, tab, par, np.cos(few), np.sin(few), R, skip, out)
         return out
