@@ -141,7 +141,7 @@ def test_bands_and_flags_of_oblique_points() -> None:
     assert np.array_equal(found.airspeed_m_s, [8.0, 8.0])
 
 
-def test_bands_from_the_roots_of_the_rotor_as_drawn_are_those_of_full_solutions(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bands_from_the_roots_of_the_rotor_as_drawn_are_those_in_full(monkeypatch: pytest.MonkeyPatch) -> None:
     angle, V = (v.ravel() for v in np.meshgrid([10.0, 45.0, 90.0, 150.0], [2.0, 6.0, 12.0]))
     near = bemt.propeller("9x6").solve(6000, V, angle_deg=angle)
     monkeypatch.setattr(propagate, "Near", lambda: None)

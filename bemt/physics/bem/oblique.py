@@ -381,20 +381,23 @@ def _entries(stamp: int) -> dict[str, Any]:
     @njit
     def plain(points, st, tab, par, cs, sn, few_cs, few_sn, R, out, hub, disk, roots):
         for p in range(points.shape[0] if stamp >= 0 else 0):
-            _point(residual.lookup_plain, points[p], st, tab, par, cs, sn, few_cs, few_sn, R, out[p], hub[p], disk[p],
-                   roots[p])  # fmt: skip
+            _point(
+                residual.lookup_plain, points[p], st, tab, par, cs, sn, few_cs, few_sn, R, out[p], hub[p], disk[p], roots[p]
+            )
 
     @njit
     def full(points, st, tab, par, cs, sn, few_cs, few_sn, R, out, hub, disk, roots):
         for p in range(points.shape[0] if stamp >= 0 else 0):
-            _point(residual.lookup_full, points[p], st, tab, par, cs, sn, few_cs, few_sn, R, out[p], hub[p], disk[p],
-                   roots[p])  # fmt: skip
+            _point(
+                residual.lookup_full, points[p], st, tab, par, cs, sn, few_cs, few_sn, R, out[p], hub[p], disk[p], roots[p]
+            )
 
     @njit
     def factored(points, st, tab, par, cs, sn, few_cs, few_sn, R, out, hub, disk, roots):
         for p in range(points.shape[0] if stamp >= 0 else 0):
-            _point(residual.lookup_factored, points[p], st, tab, par, cs, sn, few_cs, few_sn, R, out[p], hub[p], disk[p],
-                   roots[p])  # fmt: skip
+            _point(
+                residual.lookup_factored, points[p], st, tab, par, cs, sn, few_cs, few_sn, R, out[p], hub[p], disk[p], roots[p]
+            )
 
     @njit
     def near_plain(points, roots, st, tab, par, cs, sn, R, skip, out):
