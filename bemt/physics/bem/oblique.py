@@ -242,10 +242,11 @@ def _numbers(point, par):
 
 
 @inlined
-def _point(lookup, point, st, tab, par, cs, sn, few_cs, few_sn, R, out, hub, disk, roots):
+def _point(lookup, point, st, tab, par, rounds, R, out, hub, disk, roots):
     """Solve every annulus of one operating point and integrate over blade and azimuth."""
     wide()
     fx, g, stride, B = _numbers(point, par)
+    cs, sn, few_cs, few_sn = rounds
     n = cs.shape[0]
     few = few_cs.shape[0]
     log_rho_mu = math.log(point[P_RHO] / point[P_MU])
@@ -379,25 +380,19 @@ def _entries(stamp: int) -> dict[str, Any]:
     """Entry points; a closure over ``stamp`` renews numba's cache when functions of other files change."""
 
     @njit
-    def plain(points, st, tab, par, cs, sn, few_cs, few_sn, R, out, hub, disk, roots):
+    def plain(points, st, tab, par, rounds, R, out, hub, disk, roots):
         for p in range(points.shape[0] if stamp >= 0 else 0):
-            _point(
-                residual.lookup_plain, points[p], st, tab, par, cs, sn, few_cs, few_sn, R, out[p], hub[p], disk[p], roots[p]
-            )
+            _point(residual.lookup_plain, points[p], st, tab, par, rounds, R, out[p], hub[p], disk[p], roots[p])
 
     @njit
-    def full(points, st, tab, par, cs, sn, few_cs, few_sn, R, out, hub, disk, roots):
+    def full(points, st, tab, par, rounds, R, out, hub, disk, roots):
         for p in range(points.shape[0] if stamp >= 0 else 0):
-            _point(
-                residual.lookup_full, points[p], st, tab, par, cs, sn, few_cs, few_sn, R, out[p], hub[p], disk[p], roots[p]
-            )
+            _point(residual.lookup_full, points[p], st, tab, par, rounds, R, out[p], hub[p], disk[p], roots[p])
 
     @njit
-    def factored(points, st, tab, par, cs, sn, few_cs, few_sn, R, out, hub, disk, roots):
+    def factored(points, st, tab, par, rounds, R, out, hub, disk, roots):
         for p in range(points.shape[0] if stamp >= 0 else 0):
-            _point(
-                residual.lookup_factored, points[p], st, tab, par, cs, sn, few_cs, few_sn, R, out[p], hub[p], disk[p], roots[p]
-            )
+            _point(residual.lookup_factored, points[p], st, tab, par, rounds, R, out[p], hub[p], disk[p], roots[p])
 
     @njit
     def near_plain(points, roots, st, tab, par, cs, sn, R, skip, out):
@@ -474,7 +469,7 @@ def run(
     maps = np.zeros((points.shape[0], st.shape[0] if disk else 0, n))
     found = np.empty((points.shape[0], 0, 2)) if roots is None else roots
     rounds = np.cos(psi), np.sin(psi), np.cos(few), np.sin(few)
-    ready(_ENTRIES[layout][0])(points, st, tab, par, *rounds, R, out, hub, maps, found)
+    ready(_ENTRIES[layout][0])(points, st, tab, par, rounds, R, out, hub, maps, found)
     return out, hub, maps
 
 
