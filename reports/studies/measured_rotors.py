@@ -2,13 +2,15 @@
 
 ``python reports/studies/measured_rotors.py uiuc uiuc_2 --out bemt/rotors/measured.npz`` writes the file; ``--pairs``
 instead predicts every propeller that was measured more than once, as two pieces or in two volumes, from its label
-alone and from its label with each other measurement.
+alone and from its label with each other measurement. ``--sittings`` does so for what was measured in two sittings: by
+other people, or with other propellers between (names of files carry initials and a number that counts runs).
 """
 
 from __future__ import annotations
 
 import argparse
 import math
+import re
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
@@ -18,6 +20,7 @@ import numpy as np
 from left_out import conditioned_law, watch
 
 from bemt.base.units import INCH
+from bemt.data.readers.uiuc import UiucPropeller
 from bemt.physics.air import Air
 from bemt.rotors import measured
 from bemt.rotors.as_measured import as_measured
@@ -32,6 +35,8 @@ from bemt.rotors.validate.propellers import effects_without, where
 
 STILL, FLIGHT = 3, 9
 """Smooth readings at rest and in flight; all of one kind where the other was not measured [1]."""
+APART = 20
+"""Runs from which on others lay between, of at most nine of one propeller [1]."""
 
 
 def smooth(seen: Observed, p: Population) -> tuple[np.ndarray, ...]:
@@ -91,6 +96,26 @@ def predicted(text: str, seen: Observed) -> dict[str, np.ndarray]:
     return {"error": off / m.y, "held68": np.abs(off) <= u, "held95": np.abs(off) <= u95}
 
 
+def sittings(p: UiucPropeller) -> list[UiucPropeller]:
+    """The propeller as each sitting measured it."""
+    runs: dict[tuple[str, int], list[str]] = {}
+    for one in (*p.statics, *p.lines):
+        tag = re.search(r"_(?:([a-z]+)(\d{3,4})|(\d{3,4})([a-z]+))(?:_\d+)?$", Path(one.file).stem)
+        if tag:
+            runs.setdefault((tag[1] or tag[4], int(tag[2] or tag[3])), []).append(one.file)
+    groups: list[set[str]] = []
+    last = ("", 0)
+    for who, number in sorted(runs):
+        if who != last[0] or number - last[1] > APART:
+            groups.append(set())
+        groups[-1] |= set(runs[who, number])
+        last = who, number
+    return [
+        replace(p, statics=tuple(s for s in p.statics if s.file in g), lines=tuple(x for x in p.lines if x.file in g))
+        for g in groups
+    ]
+
+
 def pairs(seen: Sequence[Observed]) -> str:
     """Each propeller that was measured more than once, with and without another measurement of it."""
     groups: dict[tuple[object, ...], list[Observed]] = {}
@@ -130,8 +155,16 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument("folders", metavar="DIR", nargs="+", help="folders in the UIUC layout, or uiuc")
     parser.add_argument("--out", metavar="FILE", help="write the records to this file")
     parser.add_argument("--pairs", action="store_true", help="predict what was measured more than once")
+    parser.add_argument("--sittings", action="store_true", help="predict what was measured in two sittings")
+    parser.add_argument("--every", type=int, default=1, help="only one of so many of these")
     args = parser.parse_args(words)
-    every = watch(read_folders([where(f) for f in args.folders]), effects_without([]))
+    folder = read_folders([where(f) for f in args.folders])
+    if args.sittings:
+        parted = [(parts, s) for p, s in folder.propellers if len(parts := sittings(p)) > 1 and p.pitch_in]
+        kept = tuple((part, s) for parts, s in parted[:: args.every] for part in parts)
+        print(pairs(watch(replace(folder, propellers=kept), effects_without([]))))
+        return 0
+    every = watch(folder, effects_without([]))
     if args.pairs:
         print(pairs(every))
     made = []
