@@ -13,6 +13,7 @@ import math
 import re
 import sys
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -30,7 +31,7 @@ from bemt.rotors.conditioning import apart
 from bemt.rotors.measured import MeasuredRotor
 from bemt.rotors.population import Population, population
 from bemt.rotors.predict import predict
-from bemt.rotors.validate.points import Observed, counted, read_folders
+from bemt.rotors.validate.points import Folder, Observed, Stations, counted, read_folders
 from bemt.rotors.validate.propellers import effects_without, where
 
 STILL, FLIGHT = 3, 9
@@ -116,30 +117,48 @@ def sittings(p: UiucPropeller) -> list[UiucPropeller]:
     ]
 
 
-def pairs(seen: Sequence[Observed]) -> str:
-    """Each propeller that was measured more than once, with and without another measurement of it."""
+Predicted = dict[str, list[tuple[np.ndarray, dict[str, np.ndarray]]]]
+
+
+def twins_of(seen: Sequence[Observed]) -> list[list[Observed]]:
+    """What was measured more than once."""
     groups: dict[tuple[object, ...], list[Observed]] = {}
     for one in seen:
         p = one.propeller
         if p.pitch_in:
             groups.setdefault((p.family, round(p.diameter_in, 2), round(p.pitch_in, 2), p.blades), []).append(one)
-    found: dict[str, list[tuple[Observed, dict[str, np.ndarray]]]] = {"with": [], "without": []}
-    for twins in (group for group in groups.values() if len(group) > 1):
-        for target in twins:
-            text = case_text(target)
-            found["without"].append((target, predicted(text, target)))
-            for other in (one for one in twins if one is not target):
-                known = record(other, population())
-                known = replace(known, name=f"{known.name}@{known.volume}")
-                measured.records()[known.name] = known
-                told = f'known_from = "measured"\n\n[blade.as_built]\nmeasured = "{known.name}"\n\n[blade.section]'
-                short = text[: text.index("\n[[assumptions]]")].replace("[blade.section]", told)
-                found["with"].append((target, predicted(short, target)))
+    return [group for group in groups.values() if len(group) > 1]
+
+
+def each_other(twins: Sequence[Observed]) -> Predicted:
+    """Every measurement of a propeller, predicted with and without another one of it; which points are static."""
+    found: Predicted = {"with": [], "without": []}
+    for target in twins:
+        text, still = case_text(target), target.record.static
+        found["without"].append((still, predicted(text, target)))
+        for other in (one for one in twins if one is not target):
+            known = record(other, population())
+            known = replace(known, name=f"{known.name}@{known.volume}")
+            measured.records()[known.name] = known
+            told = f'known_from = "measured"\n\n[blade.as_built]\nmeasured = "{known.name}"\n\n[blade.section]'
+            short = text[: text.index("\n[[assumptions]]")].replace("[blade.section]", told)
+            found["with"].append((still, predicted(short, target)))
+    return found
+
+
+def parts_apart(one: tuple[list[UiucPropeller], Stations]) -> Predicted:
+    """The sittings of a propeller, predicted from each other."""
+    return each_other(watch(Folder(tuple((p, one[1]) for p in one[0]), (), ()), effects_without([])))
+
+
+def table(of: Sequence[Predicted]) -> str:
+    """Errors and coverage of propellers that were measured more than once."""
     lines = [f"{'':10}{'':8}{'':>4} {'pairs':>6} {'median':>7} {'p90':>6} {'68 %':>6} {'95 %':>6}"]
-    for how, rows in found.items():
+    for how in ("with", "without"):
+        rows = [row for one in of for row in one[how]]
         for kind, still in (("static", True), ("forward", False)):
             for i, q in enumerate(("CT", "CP")):
-                own = [{k: v[i][seen.record.static == still] for k, v in one.items()} for seen, one in rows]
+                own = [{k: v[i][static == still] for k, v in one.items()} for static, one in rows]
                 own = [one for one in own if one["error"].size]
                 if own:
                     error = np.abs([np.median(one["error"]) for one in own])
@@ -156,17 +175,17 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument("--out", metavar="FILE", help="write the records to this file")
     parser.add_argument("--pairs", action="store_true", help="predict what was measured more than once")
     parser.add_argument("--sittings", action="store_true", help="predict what was measured in two sittings")
-    parser.add_argument("--every", type=int, default=1, help="only one of so many of these")
+    parser.add_argument("--jobs", type=int, default=1, help="processes of --sittings")
     args = parser.parse_args(words)
     folder = read_folders([where(f) for f in args.folders])
     if args.sittings:
         parted = [(parts, s) for p, s in folder.propellers if len(parts := sittings(p)) > 1 and p.pitch_in]
-        kept = tuple((part, s) for parts, s in parted[:: args.every] for part in parts)
-        print(pairs(watch(replace(folder, propellers=kept), effects_without([]))))
+        with ProcessPoolExecutor(args.jobs) as pool:
+            print(table(list(pool.map(parts_apart, parted))))
         return 0
     every = watch(folder, effects_without([]))
     if args.pairs:
-        print(pairs(every))
+        print(table([each_other(twins) for twins in twins_of(every)]))
     made = []
     for seen in every if args.out else []:
         if not seen.propeller.pitch_in or not math.isfinite(seen.propeller.pitch_in):
