@@ -25,9 +25,9 @@ def main() -> int:
         angle, J = (v.ravel() for v in np.meshgrid(ANGLES, RATIOS))
         V, near = J * case.rpm / 60.0 * case.diameter_m, propagate.Near
         found = propagate.propagate(case, None, V, angle_deg=angle).points
-        propagate.Near = lambda: None  # type: ignore[misc,assignment]
+        propagate.Near = lambda: None
         full = propagate.propagate(case, None, V, angle_deg=angle).points
-        propagate.Near = near  # type: ignore[misc]
+        propagate.Near = near
         for q in ("CT", "CP"):
             off.setdefault(f"{q}, u of the unknowns", []).append(found.u_by["input"][q] / full.u_by["input"][q] - 1.0)
             off.setdefault(f"{q}, u", []).append(found.u[q] / full.u[q] - 1.0)
