@@ -10,7 +10,9 @@ import time
 
 import numpy as np
 
-from bemt.rotors.case import case_of, fresh, propagate
+from bemt.physics.bem import oblique
+from bemt.rotors.case import case_of, fresh
+from bemt.rotors.case.propagate import propagate
 
 LABELS = ("8x5", "10x4.5MR", "5x4x3", "15x10E", "9x6SF", "4x2.5", "20x6")
 ANGLES, RATIOS = (5.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0, 105.0, 120.0, 150.0), np.linspace(0.05, 0.9, 12)
@@ -23,11 +25,11 @@ def main() -> int:
     for label in LABELS:
         case = case_of(fresh.label_text(label, measured=False), ends=False)
         angle, J = (v.ravel() for v in np.meshgrid(ANGLES, RATIOS))
-        V, near = J * case.rpm / 60.0 * case.diameter_m, propagate.Near
-        found = propagate.propagate(case, None, V, angle_deg=angle).points
-        propagate.Near = lambda: None
-        full = propagate.propagate(case, None, V, angle_deg=angle).points
-        propagate.Near = near
+        V, near = J * case.rpm / 60.0 * case.diameter_m, oblique.Near
+        found = propagate(case, None, V, angle_deg=angle).points
+        oblique.Near = lambda: None
+        full = propagate(case, None, V, angle_deg=angle).points
+        oblique.Near = near
         for q in ("CT", "CP"):
             off.setdefault(f"{q}, u of the unknowns", []).append(found.u_by["input"][q] / full.u_by["input"][q] - 1.0)
             off.setdefault(f"{q}, u", []).append(found.u[q] / full.u[q] - 1.0)
@@ -44,7 +46,7 @@ def main() -> int:
         took = []
         for _ in range(4):
             began = time.process_time()
-            propagate.propagate(case, rpm, V, 1.225, angle_deg=angle, bands=bands)
+            propagate(case, rpm, V, 1.225, angle_deg=angle, bands=bands)
             took.append(time.process_time() - began)
         print(f"{name}, {'with' if bands else 'without'} bands: {1e6 * min(took) / POINTS:.0f} us a point")
     return 0

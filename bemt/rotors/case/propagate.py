@@ -23,7 +23,6 @@ from bemt.physics import coefficients as co
 from bemt.physics.air import air_arrays
 from bemt.physics.bem.coaxial import LOADS, RATIOS, PairModel
 from bemt.physics.bem.model import HUB_LOADS
-from bemt.physics.bem.oblique import Near
 from bemt.rotors.case.pair_error import PairError
 from bemt.rotors.conditioning import CAMPAIGN, SESSION, STAND, gains_at
 from bemt.rotors.model import RealRotor, coefficients
@@ -35,6 +34,7 @@ if TYPE_CHECKING:
     from bemt.physics.air import Air
     from bemt.physics.bem.duct import DuctFlow
     from bemt.physics.bem.model import Model
+    from bemt.physics.bem.oblique import Near
     from bemt.physics.dataset import Dataset
     from bemt.rotors.case.load import Assumption, Case
 
@@ -279,7 +279,11 @@ def propagate(
     declared = own if unknowns is None else tuple(unknowns)
     of_second = _unknowns_of_second(case) if unknowns is None else ()
     skewed = (points.angle_deg != 0.0) & (points.airspeed_m_s != 0.0)
-    near = Near() if bands and np.any(skewed) else None
+    near: Near | None = None
+    if bands and np.any(skewed):
+        from bemt.physics.bem import oblique
+
+        near = oblique.Near()
     steps, done = 3 + sum(len(item.values) for item in (*declared, *of_second)), 0
 
     def solved(
