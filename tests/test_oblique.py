@@ -140,6 +140,17 @@ def test_bands_and_flags_of_oblique_points() -> None:
     assert np.array_equal(found.airspeed_m_s, [8.0, 8.0])
 
 
+def test_bands_from_the_roots_of_the_rotor_as_drawn_are_those_in_full(monkeypatch: pytest.MonkeyPatch) -> None:
+    angle, V = (v.ravel() for v in np.meshgrid([10.0, 45.0, 90.0, 150.0], [2.0, 6.0, 12.0]))
+    near = bemt.propeller("9x6").solve(6000, V, angle_deg=angle)
+    monkeypatch.setattr(oblique, "Near", lambda: None)
+    full = bemt.propeller("9x6").solve(6000, V, angle_deg=angle)
+    for q in ("CT", "CP"):
+        assert np.array_equal(near[q], full[q])
+        np.testing.assert_allclose(near.u_by["input"][q], full.u_by["input"][q], rtol=0.03)
+        np.testing.assert_allclose(near.u[q], full.u[q], rtol=0.02)
+
+
 def test_measured_propeller_at_30_deg(shared_data: Path) -> None:
     """APC 8x4.5MR, Davoudi (2019) fig. 9 as digitised by others; nothing fitted."""
     folder = shared_data / "oblique" / "apc_8x45mr"

@@ -2,15 +2,18 @@
 
 ``python reports/studies/measured_rotors.py uiuc uiuc_2 --out bemt/rotors/measured.npz`` writes the file; ``--pairs``
 instead predicts every propeller that was measured more than once, as two pieces or in two volumes, from its label
-alone and from its label with each other measurement.
+alone and from its label with each other measurement. ``--sittings`` does so for what was measured in two sittings: by
+other people, or with other propellers between (names of files carry initials and a number that counts runs).
 """
 
 from __future__ import annotations
 
 import argparse
 import math
+import re
 import sys
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +21,7 @@ import numpy as np
 from left_out import conditioned_law, watch
 
 from bemt.base.units import INCH
+from bemt.data.readers.uiuc import UiucPropeller
 from bemt.physics.air import Air
 from bemt.rotors import measured
 from bemt.rotors.as_measured import as_measured
@@ -27,11 +31,13 @@ from bemt.rotors.conditioning import apart
 from bemt.rotors.measured import MeasuredRotor
 from bemt.rotors.population import Population, population
 from bemt.rotors.predict import predict
-from bemt.rotors.validate.points import Observed, counted, read_folders
+from bemt.rotors.validate.points import Folder, Observed, Stations, counted, read_folders
 from bemt.rotors.validate.propellers import effects_without, where
 
 STILL, FLIGHT = 3, 9
 """Smooth readings at rest and in flight; all of one kind where the other was not measured [1]."""
+APART = 20
+"""Runs from which on others lay between, of at most nine of one propeller [1]."""
 
 
 def smooth(seen: Observed, p: Population) -> tuple[np.ndarray, ...]:
@@ -91,30 +97,68 @@ def predicted(text: str, seen: Observed) -> dict[str, np.ndarray]:
     return {"error": off / m.y, "held68": np.abs(off) <= u, "held95": np.abs(off) <= u95}
 
 
-def pairs(seen: Sequence[Observed]) -> str:
-    """Each propeller that was measured more than once, with and without another measurement of it."""
+def sittings(p: UiucPropeller) -> list[UiucPropeller]:
+    """The propeller as each sitting measured it."""
+    runs: dict[tuple[str, int], list[str]] = {}
+    for one in (*p.statics, *p.lines):
+        tag = re.search(r"_(?:([a-z]+)(\d{3,4})|(\d{3,4})([a-z]+))(?:_\d+)?$", Path(one.file).stem)
+        if tag:
+            runs.setdefault((tag[1] or tag[4], int(tag[2] or tag[3])), []).append(one.file)
+    groups: list[set[str]] = []
+    last = ("", 0)
+    for who, number in sorted(runs):
+        if who != last[0] or number - last[1] > APART:
+            groups.append(set())
+        groups[-1] |= set(runs[who, number])
+        last = who, number
+    return [
+        replace(p, statics=tuple(s for s in p.statics if s.file in g), lines=tuple(x for x in p.lines if x.file in g))
+        for g in groups
+    ]
+
+
+Predicted = dict[str, list[tuple[np.ndarray, dict[str, np.ndarray]]]]
+
+
+def twins_of(seen: Sequence[Observed]) -> list[list[Observed]]:
+    """What was measured more than once."""
     groups: dict[tuple[object, ...], list[Observed]] = {}
     for one in seen:
         p = one.propeller
         if p.pitch_in:
             groups.setdefault((p.family, round(p.diameter_in, 2), round(p.pitch_in, 2), p.blades), []).append(one)
-    found: dict[str, list[tuple[Observed, dict[str, np.ndarray]]]] = {"with": [], "without": []}
-    for twins in (group for group in groups.values() if len(group) > 1):
-        for target in twins:
-            text = case_text(target)
-            found["without"].append((target, predicted(text, target)))
-            for other in (one for one in twins if one is not target):
-                known = record(other, population())
-                known = replace(known, name=f"{known.name}@{known.volume}")
-                measured.records()[known.name] = known
-                told = f'known_from = "measured"\n\n[blade.as_built]\nmeasured = "{known.name}"\n\n[blade.section]'
-                short = text[: text.index("\n[[assumptions]]")].replace("[blade.section]", told)
-                found["with"].append((target, predicted(short, target)))
+    return [group for group in groups.values() if len(group) > 1]
+
+
+def each_other(twins: Sequence[Observed]) -> Predicted:
+    """Every measurement of a propeller, predicted with and without another one of it; which points are static."""
+    found: Predicted = {"with": [], "without": []}
+    for target in twins:
+        text, still = case_text(target), target.record.static
+        found["without"].append((still, predicted(text, target)))
+        for other in (one for one in twins if one is not target):
+            known = record(other, population())
+            known = replace(known, name=f"{known.name}@{known.volume}")
+            measured.records()[known.name] = known
+            told = f'known_from = "measured"\n\n[blade.as_built]\nmeasured = "{known.name}"\n\n[blade.section]'
+            short = text[: text.index("\n[[assumptions]]")].replace("[blade.section]", told)
+            found["with"].append((still, predicted(short, target)))
+    return found
+
+
+def parts_apart(one: tuple[list[UiucPropeller], Stations]) -> Predicted:
+    """The sittings of a propeller, predicted from each other."""
+    return each_other(watch(Folder(tuple((p, one[1]) for p in one[0]), (), ()), effects_without([])))
+
+
+def table(of: Sequence[Predicted]) -> str:
+    """Errors and coverage of propellers that were measured more than once."""
     lines = [f"{'':10}{'':8}{'':>4} {'pairs':>6} {'median':>7} {'p90':>6} {'68 %':>6} {'95 %':>6}"]
-    for how, rows in found.items():
+    for how in ("with", "without"):
+        rows = [row for one in of for row in one[how]]
         for kind, still in (("static", True), ("forward", False)):
             for i, q in enumerate(("CT", "CP")):
-                own = [{k: v[i][seen.record.static == still] for k, v in one.items()} for seen, one in rows]
+                own = [{k: v[i][static == still] for k, v in one.items()} for static, one in rows]
                 own = [one for one in own if one["error"].size]
                 if own:
                     error = np.abs([np.median(one["error"]) for one in own])
@@ -130,10 +174,18 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument("folders", metavar="DIR", nargs="+", help="folders in the UIUC layout, or uiuc")
     parser.add_argument("--out", metavar="FILE", help="write the records to this file")
     parser.add_argument("--pairs", action="store_true", help="predict what was measured more than once")
+    parser.add_argument("--sittings", action="store_true", help="predict what was measured in two sittings")
+    parser.add_argument("--jobs", type=int, default=1, help="processes of --sittings")
     args = parser.parse_args(words)
-    every = watch(read_folders([where(f) for f in args.folders]), effects_without([]))
+    folder = read_folders([where(f) for f in args.folders])
+    if args.sittings:
+        parted = [(parts, s) for p, s in folder.propellers if len(parts := sittings(p)) > 1 and p.pitch_in]
+        with ProcessPoolExecutor(args.jobs) as pool:
+            print(table(list(pool.map(parts_apart, parted))))
+        return 0
+    every = watch(folder, effects_without([]))
     if args.pairs:
-        print(pairs(every))
+        print(table([each_other(twins) for twins in twins_of(every)]))
     made = []
     for seen in every if args.out else []:
         if not seen.propeller.pitch_in or not math.isfinite(seen.propeller.pitch_in):

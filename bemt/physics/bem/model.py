@@ -31,6 +31,7 @@ from bemt.physics.sections.neuralfoil import neuralfoil_polar
 from bemt.physics.sections.polars import RE_FIXED, Polar
 
 if TYPE_CHECKING:
+    from bemt.physics.bem.oblique import Near
     from geometry.duct import Duct
     from geometry.rotor import Rotor, Stations
 
@@ -170,17 +171,18 @@ class Model:
         ))  # fmt: skip
 
     def solve(
-        self, rpm: ArrayLike, V: ArrayLike = 0.0, air: Air | None = None, threads: int = 1, side: ArrayLike = 0.0
-    ) -> Dataset:
+        self, rpm: ArrayLike, V: ArrayLike = 0.0, air: Air | None = None, threads: int = 1, side: ArrayLike = 0.0,
+        near: Near | None = None,
+    ) -> Dataset:  # fmt: skip
         """Solve operating points; ``V`` [m/s] along the shaft, ``side`` [m/s] in the plane of the disk.
 
         With any ``side``, the airspeed of the result (and J) is that of the wind and ``sideslip_rad`` its angle to the
         shaft; ``eta`` is T V cos(angle) / P, with the speed along the shaft. The loads of the hub are added:
         ``H_force_N`` downstream, ``Y_force_N`` to the advancing side, ``roll_moment_Nm`` lifting the advancing side,
-        ``pitch_moment_Nm`` lifting the upstream side.
+        ``pitch_moment_Nm`` lifting the upstream side. ``near`` as in :func:`bemt.physics.bem.solver.solve`.
         """
         air = Air.from_density() if air is None else air
-        s = solver.solve(self.prep, rpm, V, air, threads=threads, side=side)
+        s = solver.solve(self.prep, rpm, V, air, threads=threads, side=side, near=near)
         n, D = s.rpm / 60.0, self.diameter_m
         rho, mu, a = (np.broadcast_to(np.asarray(getattr(air, k), float), n.shape) for k in ("rho", "mu", "a_sound"))
         T, Q, T_duct, T_rotor, T_stator, V_exit, flags = s.T, s.Q, s.T_duct, s.T_rotor, s.T_stator, s.V_exit, s.flags

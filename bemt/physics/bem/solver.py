@@ -28,6 +28,7 @@ from bemt.physics.sections.polars import ALPHA_GRID
 
 if TYPE_CHECKING:
     from bemt.physics.bem.duct import DuctFlow
+    from bemt.physics.bem.oblique import Near
     from bemt.physics.sections.polars import Polar
     from geometry.rotor import Rotor, Stations
 
@@ -292,7 +293,7 @@ def solve_point(prep: Prepared, rpm: float, V: float, air: Air) -> tuple[float, 
 
 def solve(
     prep: Prepared, rpm: ArrayLike, V: ArrayLike = 0.0, air: Air | None = None, *, radial: bool = False,
-    threads: int = 1, side: ArrayLike = 0.0,
+    threads: int = 1, side: ArrayLike = 0.0, near: Near | None = None,
 ) -> Solution:  # fmt: skip
     """Solve operating points.
 
@@ -311,6 +312,9 @@ def solve(
     side : array_like
         In-plane onset speed [m/s]; points that have some are solved by :mod:`bemt.physics.bem.oblique`, open rotors
         only.
+    near : Near
+        Rotors that differ a little, at the same points in oblique flow: those after the first cost a tenth and have no
+        hub loads.
 
     Returns
     -------
@@ -334,7 +338,7 @@ def solve(
     """
     air = Air.from_density() if air is None else air
     if np.any(side):
-        return _solve_oblique(prep, rpm, V, air, side, radial)
+        return _solve_oblique(prep, rpm, V, air, side, radial, near)
     fields = [np.asarray(v, dtype=float) for v in (rpm, V, air.rho, air.mu, air.a_sound)]
     points = np.empty((*np.broadcast_shapes(*(f.shape for f in fields)), K.N_POINT))
     for i, values in enumerate(fields):
@@ -368,7 +372,9 @@ def _check(points: Array) -> None:
         raise ValueError("airspeed or air: got a value that is not finite or not positive")
 
 
-def _solve_oblique(prep: Prepared, rpm: ArrayLike, V: ArrayLike, air: Air, side: ArrayLike, radial: bool) -> Solution:
+def _solve_oblique(
+    prep: Prepared, rpm: ArrayLike, V: ArrayLike, air: Air, side: ArrayLike, radial: bool, near: Near | None
+) -> Solution:
     """Points of which some have in-plane wind: the others go through the axial kernel."""
     from bemt.physics.bem import oblique
 
@@ -385,10 +391,13 @@ def _solve_oblique(prep: Prepared, rpm: ArrayLike, V: ArrayLike, air: Air, side:
     entry, st, tab, par = prep.kernel
     out, rad = np.empty((n, K.N_OUT)), np.empty((n, 0, K.N_RADIAL))
     given = prep.layout, points[skew], st, tab, par, prep.rotor.R
-    if prep.cone is None:
+    disk_ = np.zeros((given[1].shape[0], 0, 0))
+    if prep.cone is not None:
+        out[skew], hub_, disk_ = oblique.flap(*given, prep.cone, disk=radial)
+    elif radial or near is None:
         out[skew], hub_, disk_ = oblique.run(*given, disk=radial)
     else:
-        out[skew], hub_, disk_ = oblique.flap(*given, prep.cone, disk=radial)
+        out[skew], hub_ = near.run(*given)
     if not np.all(skew):
         rest = np.ascontiguousarray(points[~skew, : K.N_POINT])
         part = np.empty((rest.shape[0], K.N_OUT))

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from bemt.physics.air import Air
     from bemt.physics.bem.duct import DuctFlow
     from bemt.physics.bem.model import Model
+    from bemt.physics.bem.oblique import Near
     from bemt.physics.dataset import Dataset
     from bemt.rotors.case.load import Assumption, Case
 
@@ -70,11 +71,11 @@ class Points:
         n, V, rho, angle = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, dtype=float)) for v in given))
         return Points(case, n.ravel(), V.ravel(), rho.ravel(), angle.ravel())
 
-    def solve(self, model: Model | PairModel, changed: Case, threads: int) -> Dataset:
-        """A model of a changed case solved at the points."""
+    def solve(self, model: Model | PairModel, changed: Case, threads: int, near: Near | None = None) -> Dataset:
+        """A model of a changed case solved at the points, near the ones solved before."""
         rpm, V, air = at = self.conditions(changed)
         model = model.at_speeds(*at)
-        return solve_at(model, rpm, V, self.angles(changed), air, threads)
+        return solve_at(model, rpm, V, self.angles(changed), air, threads, near)
 
     def angles(self, changed: Case) -> Array:
         """Angle between wind and shaft at the points in a changed case [deg]."""
@@ -93,8 +94,9 @@ class Points:
 
 
 def solve_at(
-    model: Model | PairModel, rpm: Array, airspeed_m_s: Array, angle_deg: Array, air: Air, threads: int = 1
-) -> Dataset:
+    model: Model | PairModel, rpm: Array, airspeed_m_s: Array, angle_deg: Array, air: Air, threads: int = 1,
+    near: Near | None = None,
+) -> Dataset:  # fmt: skip
     """A model at points (P,) with their angle between wind and shaft [deg].
 
     With any angle, airspeed and J are those given, eta is T V cos(angle) / P, and the loads of the hub are there, 0 in
@@ -103,7 +105,10 @@ def solve_at(
     if not np.any(angle_deg):
         return model.solve(rpm, airspeed_m_s, air, threads)
     along, side = parted(airspeed_m_s, angle_deg)
-    found = model.solve(rpm, along, air, threads, side)
+    if isinstance(model, PairModel):
+        found = model.solve(rpm, along, air, threads, side)
+    else:
+        found = model.solve(rpm, along, air, threads, side, near)
     J = np.asarray(co.J(airspeed_m_s, found.rpm / 60.0, model.diameter_m))
     none = dict.fromkeys(HUB_LOADS, np.where(found.converged, 0.0, np.nan))
     own = {"airspeed_m_s": airspeed_m_s, "J": J, "eta": co.eta(along / (found.rpm / 60.0) / model.diameter_m,
@@ -273,6 +278,12 @@ def propagate(
     own = (*(item for item in case.assumptions if not item.key.startswith("drive.")), *duct_unknowns(case))
     declared = own if unknowns is None else tuple(unknowns)
     of_second = _unknowns_of_second(case) if unknowns is None else ()
+    skewed = (points.angle_deg != 0.0) & (points.airspeed_m_s != 0.0)
+    near: Near | None = None
+    if bands and np.any(skewed):
+        from bemt.physics.bem import oblique
+
+        near = oblique.Near()
     steps, done = 3 + sum(len(item.values) for item in (*declared, *of_second)), 0
 
     def solved(
@@ -280,7 +291,7 @@ def propagate(
     ) -> tuple[Model | PairModel, Dataset]:
         nonlocal done
         model = prepared(changed, stations, second).at_speeds(*points.conditions(changed))
-        found = points.solve(model, changed, threads)
+        found = points.solve(model, changed, threads, near)
         done += 1
         if progress is not None:
             progress(done, steps, what)
@@ -291,7 +302,7 @@ def propagate(
         return {key: np.asarray(found[key], dtype=float) for key in keys}
 
     model, found = solved(case, "nominal")
-    beside, skewed = found, (points.angle_deg != 0.0) & (points.airspeed_m_s != 0.0)
+    beside = found
     if np.any(skewed):  # axial flow at the speed along the shaft
         at = points.conditions(case)
         beside = model.solve(at[0], parted(at[1], points.angle_deg)[0], at[2], threads)
