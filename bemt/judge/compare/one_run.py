@@ -171,7 +171,7 @@ def compare_run(
         notes.insert(
             0,
             f"u of the recording: not stated; that of a stand which nobody calibrated, {usual} "
-            "(a table of CFD says so by a column turbulence, cells or solver)",
+            "(a computed table says so by a column turbulence, cells or solver)",
         )
         stand = {k: np.where(np.isnan(full.u[k]), STAND_U[k] * np.abs(full[k]), full.u[k]) for k in open_u}
         full = replace(full, u={**full.u, **stand})
