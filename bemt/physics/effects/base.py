@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from bemt.physics.bem.duct import DuctFlow
     from geometry.airfoil import Airfoil
 
 Array = NDArray[np.float64]
@@ -489,15 +490,17 @@ class Effect:
     def momentum(self, bake: RotorBuild) -> None:
         """Set kernel numbers; does nothing by default."""
 
-    def duct(self, R: float, stated: bool) -> Mapping[str, float] | None:
-        """Numbers of :class:`bemt.physics.bem.duct.DuctFlow` that the effect sets to duct an open rotor; None: no duct.
+    def duct(self, R: float, stated: DuctFlow | None) -> Mapping[str, float] | None:
+        """Numbers of :class:`bemt.physics.bem.duct.DuctFlow` that the effect sets; None: none.
+
+        An open rotor gets a duct by them.
 
         Parameters
         ----------
         R : float
             Tip radius [m].
-        stated : bool
-            Whether the case itself has a duct.
+        stated : bemt.physics.bem.duct.DuctFlow or None
+            The duct so far; None: an open rotor.
 
         Returns
         -------
