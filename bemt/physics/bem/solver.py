@@ -188,7 +188,7 @@ def prepare(
     if not any(e.id == "reynolds" for e in eff):
         polars = [(x, arrays.at_fixed_re(p)) for x, p in polars]
     for e in eff:
-        duct = _enclosed(duct, e.duct(rotor.R, duct))
+        duct = _enclosed(duct, e.duct(rotor.R, duct is not None))
     if duct is not None:
         duct = replace(duct, area=rotor.annulus_area, span=rotor.R - rotor.Rhub)
     s = stations if stations is not None else rotor.blade.midpoints(n_stations, spacing="cosine")

@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from bemt.physics.bem.duct import DuctFlow
     from geometry.airfoil import Airfoil
 
 Array = NDArray[np.float64]
@@ -490,17 +489,15 @@ class Effect:
     def momentum(self, bake: RotorBuild) -> None:
         """Set kernel numbers; does nothing by default."""
 
-    def duct(self, R: float, stated: DuctFlow | None) -> Mapping[str, float] | None:
-        """Numbers of :class:`bemt.physics.bem.duct.DuctFlow` that the effect sets; None: none.
-
-        An open rotor gets a duct by them.
+    def duct(self, R: float, stated: bool) -> Mapping[str, float] | None:
+        """Numbers of :class:`bemt.physics.bem.duct.DuctFlow` that the effect sets to duct an open rotor; None: no duct.
 
         Parameters
         ----------
         R : float
             Tip radius [m].
-        stated : bemt.physics.bem.duct.DuctFlow or None
-            The duct so far; None: an open rotor.
+        stated : bool
+            Whether the case itself has a duct.
 
         Returns
         -------

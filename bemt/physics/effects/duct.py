@@ -5,12 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from bemt.physics.effects.base import Effect, Parameter
-
-if TYPE_CHECKING:
-    from bemt.physics.bem.duct import DuctFlow
 
 
 @dataclass(frozen=True)
@@ -45,9 +41,9 @@ class DuctEffect(Effect):
     )
     on_by_default = False
 
-    def duct(self, R: float, stated: DuctFlow | None) -> Mapping[str, float] | None:
+    def duct(self, R: float, stated: bool) -> Mapping[str, float] | None:
         """Exit area ratio of the duct, and what a case would state of it."""
-        if stated is not None:
+        if stated:
             return {"wake_ratio": self.wake_ratio}
         drag_area = self.outer_drag * math.pi * R**2
         return {"wake_ratio": self.wake_ratio, "lip_loss": self.lip_loss, "drag_area": drag_area}

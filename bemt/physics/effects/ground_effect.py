@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bemt.physics.effects.base import Array, Effect, Flow, Parameter, choice
 
-if TYPE_CHECKING:
-    from bemt.physics.bem.duct import DuctFlow
-
-FORMS = ("cheeseman_bennett", "hayden", "smaller_jet")
+FORMS = ("cheeseman_bennett", "hayden")
 
 
 @dataclass(frozen=True)
@@ -29,13 +24,6 @@ class GroundEffect(Effect):
     way. Coefficients checked against public codes, not against the papers; the fading belongs to edgewise flow there
     and is used for axial flow here. The rotor sees V - share v. A recorded ``wall_distance_m`` replaces z_over_R;
     closer than R/2 counts as R/2.
-
-    ``form = "smaller_jet"``, ducted rotors only: the wall raises the pressure in the exit. The blades are loaded more,
-    the duct pulls less, and the sum of both goes either way: blades up, duct down (Zhao, Tian and Wan 2022, Aerospace
-    9:572, abstract), +3.2 % in all at 0.8 D (Zhou et al. 2025, Engineering, abstract), less in all (Aerospace 2023,
-    10:659, abstract). At equal thrust a jet of area A_j passes m^2 = rho A_j T at rest, so that the image that takes a
-    share off the speed through the disk leaves (1 - share)^2 of the jet's area (derived here, declared; the share is
-    that of Cheeseman and Bennett). It keeps to z_over_R, also where a distance is recorded point by point.
 
     The wall also decelerates wind along the axis. Ahead of a disk of radius a, on its axis, a stream V is V (1 - (2/pi)
     (acot(zeta) - zeta / (1 + zeta^2))), zeta = z/a (potential of a disk moving broadside on, Lamb 1932, Hydrodynamics,
@@ -68,21 +56,8 @@ class GroundEffect(Effect):
         """Refuse unknown forms."""
         choice("form", self.form, FORMS)
 
-    def duct(self, R: float, stated: DuctFlow | None) -> Mapping[str, float] | None:
-        """Leave less of the jet's area."""
-        if stated is None or self.form != "smaller_jet":
-            return None
-        share = min(self.strength * float(self.relief(np.array(self.z_over_R))), 0.5)
-        return {"contraction": stated.contraction * (1.0 - share) ** 2}
-
-    def plausible(self, flow: Flow) -> bool:
-        """Whether the form is one of this rotor, and of one distance."""
-        return self.form != "smaller_jet" or (flow.ducted and "wall_distance_m" not in flow.extra)
-
     def flow(self, flow: Flow) -> None:
         """Take the dammed shares of induced speed and wind off the onset speed."""
-        if self.form == "smaller_jet":
-            return
         z = flow.extra["wall_distance_m"] / flow.R if "wall_distance_m" in flow.extra else np.array(self.z_over_R)
         v = flow.induced
         fade = v**2 / np.maximum(v**2 + flow.V**2, 1e-12)
@@ -106,10 +81,10 @@ class GroundEffect(Effect):
         return np.asarray(1.0 - (1.0 - (0.25 / z) ** 2) ** 1.5)
 
     def variants(self) -> tuple[dict[str, str | float], ...]:
-        """All forms at twelve distances as published; those of open rotors weaker, stronger and behind plates at three."""
+        """Both forms at twelve distances as published; weaker, stronger and behind plates at three."""
         settings = [(f, z, 1.0, 0.0) for f in FORMS for z in map(float, np.geomspace(0.5, 3.0, 12))]
         settings += [
-            (f, z, s, a) for f in FORMS[:2] for z in (0.7, 1.2, 2.0) for s in (0.6, 1.0, 1.7, 3.0) for a in (0.0, 1.0, 2.0)
+            (f, z, s, a) for f in FORMS for z in (0.7, 1.2, 2.0) for s in (0.6, 1.0, 1.7, 3.0) for a in (0.0, 1.0, 2.0)
             if (s, a) != (1.0, 0.0)
         ]  # fmt: skip
         names = ("form", "z_over_R", "strength", "plate_radius_over_R")
