@@ -13,8 +13,8 @@ from bemt import propeller
 from bemt.physics import effects
 from bemt.physics.air import Air
 from bemt.physics.bem import model as bem
-from bemt.physics.bem.duct import DuctFlow
 from bemt.physics.bem import solver
+from bemt.physics.bem.duct import DuctFlow
 from bemt.physics.effects import compressibility, drag_divergence, stall_delay
 from bemt.physics.effects.air_density import AirDensity
 from bemt.physics.effects.airspeed_offset import AirspeedOffset

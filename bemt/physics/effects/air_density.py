@@ -14,9 +14,9 @@ class AirDensity(Effect):
     Notes
     -----
     rho (1 + change). +-3 % is weather (CIPM-2007, Picard et al. 2008, Metrologia 45:149: 1 % per 3 K or 10 hPa); -30 %
-    is 3500 m of the U.S. Standard Atmosphere (1976). Half of all people live below 194 m, -2 %, and 74 % below 500 m,
-    -5 % (Cohen and Small 1998, PNAS 95:14009, abstract); hence a heavy-tailed prior. Viscosity and speed of sound stay the same: they depend on
-    temperature only.
+    is 3500 m of the U.S. Standard Atmosphere (1976). Half of all people live below 194 m, -2 % (Cohen and Small 1998,
+    PNAS 95:14009, abstract); hence a heavy-tailed prior, its 5 % declared. Viscosity and speed of sound stay the same:
+    they depend on temperature only.
     """
 
     change: float = -0.10
