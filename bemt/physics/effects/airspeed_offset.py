@@ -35,7 +35,7 @@ class AirspeedOffset(Effect):
     sensor = "airspeed_m_s"
     parameters = (
         Parameter("offset_m_s", "m/s", -3.0, 3.0, "declared, pitot zero", 7, 0.0, 0.5),
-        Parameter("at_rest", "1", 0.0, 1.0, "0: zero of the sensor; 1: a draught", 2),
+        Parameter("at_rest", "1", 0.0, 1.0, "0 for a wrong sensor, 1 for a draught", 2),
     )
     on_by_default = False
 
