@@ -17,7 +17,7 @@ class AirspeedGain(Effect):
     -----
     A pitot tube gives V = C sqrt(2 q / rho), C within 1 % of 1 for a standard tube aligned with the flow (ISO
     3966:2020; not checked); a tube near the rotor or the wall, a transducer gain or a manually entered density are off
-    by more. +-20 % is declared. Static points stay static.
+    by more. +-20 % is declared, as is the usual 5 %. Static points stay static.
     """
 
     gain: float = 0.1
@@ -32,7 +32,7 @@ class AirspeedGain(Effect):
     fault = "gain"
     sensor = "airspeed_m_s"
     check = "compare the pitot with a second one, or run with the wind tunnel empty"
-    parameters = (Parameter("gain", "1", -0.2, 0.2, "declared, pitot and transducer", 5, 0.0),)
+    parameters = (Parameter("gain", "1", -0.2, 0.2, "declared, pitot and transducer", 5, 0.0, 0.05),)
     on_by_default = False
 
     def applies(self, flow: Flow) -> str:
