@@ -14,7 +14,6 @@ from bemt.physics import effects
 from bemt.physics.air import Air
 from bemt.physics.bem import model as bem
 from bemt.physics.bem import solver
-from bemt.physics.bem.duct import DuctFlow
 from bemt.physics.effects import compressibility, drag_divergence, stall_delay
 from bemt.physics.effects.air_density import AirDensity
 from bemt.physics.effects.airspeed_offset import AirspeedOffset
@@ -40,7 +39,6 @@ from bemt.physics.effects.rpm_scale import RpmScale
 from bemt.physics.effects.section import Section
 from bemt.physics.effects.stall_delay import StallDelay
 from bemt.physics.effects.supply_voltage import SupplyVoltage
-from bemt.physics.effects.tip_cut import TipCut
 from bemt.physics.effects.tip_gap import TipGap
 from bemt.physics.effects.tunnel_blockage import TunnelBlockage
 from bemt.physics.effects.unit_slip import UnitSlip
@@ -258,16 +256,6 @@ def test_a_wall_raises_thrust_at_rest_and_less_with_speed_and_distance(form: str
     assert np.all(gain > 0.0) and np.all(np.diff(gain) < 0.0) and gain[3] < 0.3 * gain[0]
     far = flow_loads(flow, GroundEffect(form=form, z_over_R=3.0))[0] / flow_loads(flow)[0] - 1.0
     assert np.all(far < 0.35 * gain) and np.all(far >= 0.0)
-
-
-def test_shorter_blades_in_a_duct_lose_thrust_and_torque() -> None:
-    found = []
-    for cut in ((), (TipCut(0.05),)):
-        prep = solver.prepare(rotor(), [(0.7, table())], cut, DuctFlow(1.0), n_stations=20)
-        s = solver.solve(prep, 6000.0, 0.0, Air.from_density(1.2))
-        found.append((float(s.T[0]), float(s.Q[0])))
-    (T, Q), (T_cut, Q_cut) = found
-    assert 0.75 < T_cut / T < 0.95 and 0.75 < Q_cut / Q < 0.95
 
 
 def test_cheeseman_and_bennett_hold_at_constant_power() -> None:

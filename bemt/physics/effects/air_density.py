@@ -14,9 +14,8 @@ class AirDensity(Effect):
     Notes
     -----
     rho (1 + change). +-3 % is weather (CIPM-2007, Picard et al. 2008, Metrologia 45:149: 1 % per 3 K or 10 hPa); -30 %
-    is 3500 m of the U.S. Standard Atmosphere (1976). One in four people lives above 500 m, -5 % (Cohen and Small 1998,
-    PNAS 95:14009, by a summary: 73.7 % below): hence a heavy-tailed prior with that quartile. Viscosity and speed of
-    sound stay the same: they depend on temperature only.
+    is 3500 m of the U.S. Standard Atmosphere (1976). Viscosity and speed of sound stay the same: they depend on
+    temperature only.
     """
 
     change: float = -0.10
@@ -29,7 +28,7 @@ class AirDensity(Effect):
         "thrust and torque off by the same share at every speed and advance ratio; a cell gain moves only one of them"
     )
     parameters = (
-        Parameter("change", "1", -0.35, 0.5, "weather +-3 %; altitude to 3500 m, seldom above 500 m", 7, 0.0, 0.06),
+        Parameter("change", "1", -0.35, 0.5, "weather +-3 %; altitude to 3500 m, forgotten or wrongly stated", 7, 0.0),
     )
     on_by_default = False
 

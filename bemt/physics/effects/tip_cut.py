@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.physics.effects.base import Effect, Parameter, RotorBuild
+from bemt.physics.effects.base import Effect, Flow, Parameter, RotorBuild
 
 
 @dataclass(frozen=True)
@@ -19,8 +19,7 @@ class TipCut(Effect):
     radius). Blade elements are those of the shorter blade, each with the section of the element that it replaces.
     Thrust falls faster than any section drag or gain explains, about as the fourth power of the radius, torque as the
     fifth (Buckingham 1914 for similar blades; a cut blade keeps its chord at the new tip and loses less). Range up to
-    15 %, usually 5 % (declared): cut to fit a frame, or damaged. In a duct the gap grows as well; what gaps were
-    measured to lose (`tip_gap`) holds the missing blade already, and is not counted twice.
+    15 % (declared): cut to fit a frame, or damaged. Open rotors only: in a duct shorter blades are a wider gap.
     """
 
     cut: float = 0.05
@@ -30,8 +29,12 @@ class TipCut(Effect):
     title = "blades shorter than stated"
     sign = "less thrust and even less torque at every speed; the advance ratio of zero thrust barely moves"
     check = "measure the diameter"
-    parameters = (Parameter("cut", "1", 0.0, 0.15, "declared, share of the radius", 4, 0.0, 0.05),)
+    parameters = (Parameter("cut", "1", 0.0, 0.15, "declared, share of the radius", 4, 0.0),)
     on_by_default = False
+
+    def applies(self, flow: Flow) -> str:
+        """In a duct the gap is what changes."""
+        return "in a duct shorter blades are a wider tip gap" if flow.ducted else ""
 
     def blade(self, bake: RotorBuild) -> None:
         """End the blades at the new radius."""

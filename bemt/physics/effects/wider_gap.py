@@ -14,7 +14,7 @@ class WiderGap(Effect):
     Notes
     -----
     Geometry only: the gap grows by a length, and `tip_gap` gives the loss (Wisler 1985 and Cumpsty 1989 there). A
-    printed duct that shrank or went oval, a rotor that grows under load. The gap is never below
+    worn or cut tip, a printed duct that shrank or went oval, a rotor that grows under load. The gap is never below
     zero.
     """
 

@@ -23,7 +23,6 @@ from bemt.physics import coefficients as co
 from bemt.physics.air import air_arrays
 from bemt.physics.bem.coaxial import LOADS, RATIOS, PairModel
 from bemt.physics.bem.model import HUB_LOADS
-from bemt.rotors.case.pair_error import PairError
 from bemt.rotors.conditioning import CAMPAIGN, SESSION, STAND, gains_at
 from bemt.rotors.model import RealRotor, coefficients
 from bemt.rotors.population import population
@@ -307,6 +306,8 @@ def propagate(
         at = points.conditions(case)
         beside = model.solve(at[0], parted(at[1], points.angle_deg)[0], at[2], threads)
     if isinstance(model, PairModel):
+        from bemt.rotors.case.pair_error import PairError
+
         error = PairError.of(case, model, found, points.conditions(case)[2])
         words = error.words
     else:
