@@ -316,7 +316,6 @@ def test_a_map_of_two_rotors_is_the_second_rotor_and_no_fault_of_the_stand(share
         assert not {"torque_zero", "thrust_zero", "torque_gain", "thrust_gain"} & set(answer.effects)
 
 
-@pytest.mark.xfail(strict=True, reason="oblique inflow is first in a class, not named alone")
 def test_two_angles_are_oblique_inflow_and_no_other_propeller(tmp_path: Path, shared_data: Path) -> None:
     """One propeller with the wind along the shaft and 30 deg from it: by the recorded angle, and without."""
     folder = shared_data / "oblique" / "apc_8x45mr"

@@ -71,10 +71,11 @@ class Points:
         return Points(case, n.ravel(), V.ravel(), rho.ravel(), angle.ravel())
 
     def solve(self, model: Model | PairModel, changed: Case, threads: int, near: Near | None = None) -> Dataset:
-        """A model of a changed case solved at the points, near the ones solved before."""
+        """A model of a changed case solved at the points, near the ones solved before unless the points change, too."""
         rpm, V, air = at = self.conditions(changed)
         model = model.at_speeds(*at)
-        return solve_at(model, rpm, V, self.angles(changed), air, threads, near)
+        one, two = ((c.rpm, c.airspeed_m_s, c.angle_deg, c.air().rho) for c in (self.case, changed))
+        return solve_at(model, rpm, V, self.angles(changed), air, threads, near if one == two else None)
 
     def angles(self, changed: Case) -> Array:
         """Angle between wind and shaft at the points in a changed case [deg]."""
