@@ -409,7 +409,7 @@ _HEADER = ["metric", "count", "value", "95 % (Wilson)", "target", "met"]
 
 
 def _tables(found: Proof) -> list[tuple[str, list[str], list[list[str]]]]:
-    strata = [[f"above {s.low:g}" if math.isnan(s.high) else f"{s.low:g} to {s.high:g}", str(s.n),
+    strata = [[f"{s.low:g} to {s.high:g}" if math.isfinite(s.high) else f"above {s.low:g}", str(s.n),
                str(s.top1), str(s.claims), str(s.right)] for s in found.strata]  # fmt: skip
     reliable = [["with" if r.reference else "without", f"{r.low:g} to {r.high:g}", str(r.n), f"{r.stated:.3f}",
                  f"{r.there / r.n:.3f}", " to ".join(f"{v:.2f}" for v in wilson(r.there, r.n))]
