@@ -19,12 +19,11 @@ class AirspeedOffset(Effect):
     Notes
     -----
     Draught in the hall or zero of the pitot transducer: 0.15 Pa is 0.5 m/s in still air. The range is declared.
-    Points recorded at V = 0 stay static where the sensor is wrong; a draught meets them as well (``at_rest``, its share
-    there), and does not turn round. A live sensor that reads nearly nothing at rest does not read too much.
+    Points recorded at V = 0 are treated as static and stay so; a wind does not turn round. A live sensor that reads
+    nearly nothing at rest does not read too much.
     """
 
     offset_m_s: float = 0.5
-    at_rest: float = 0.0
 
     id = "airspeed_offset"
     title = "airspeed offset"
@@ -33,10 +32,7 @@ class AirspeedOffset(Effect):
     kind = "stand"
     fault = "zero"
     sensor = "airspeed_m_s"
-    parameters = (
-        Parameter("offset_m_s", "m/s", -3.0, 3.0, "declared, pitot zero", 7, 0.0, 0.5),
-        Parameter("at_rest", "1", 0.0, 1.0, "0 for a wrong sensor, 1 for a draught", 2),
-    )
+    parameters = (Parameter("offset_m_s", "m/s", -3.0, 3.0, "declared, pitot zero", 7, 0.0, 0.5),)
     on_by_default = False
 
     def applies(self, flow: Flow) -> str:
@@ -46,9 +42,7 @@ class AirspeedOffset(Effect):
     def flow(self, flow: Flow) -> None:
         """Shift the airspeed."""
         shifted = flow.V + self.offset_m_s
-        flow.V = np.select(
-            [flow.V > 0.0, flow.V < 0.0], [np.maximum(shifted, 0.0), shifted], max(self.at_rest * self.offset_m_s, 0.0)
-        )
+        flow.V = np.select([flow.V > 0.0, flow.V < 0.0], [np.maximum(shifted, 0.0), shifted], flow.V)
 
     def plausible(self, flow: Flow) -> bool:
         """No live reading becomes a wind against the rotor."""
