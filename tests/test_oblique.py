@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 import bemt
 from bemt.base.errors import InputError
 from bemt.physics.air import Air
-from bemt.physics.bem import oblique, solver
+from bemt.physics.bem import oblique, oblique_near, solver
 from bemt.physics.effects import Effect, standard
 from bemt.physics.effects.flapping import Flapping
 from bemt.physics.sections.neuralfoil import neuralfoil_polar
@@ -143,7 +143,7 @@ def test_bands_and_flags_of_oblique_points() -> None:
 def test_bands_from_the_roots_of_the_rotor_as_drawn_are_those_in_full(monkeypatch: pytest.MonkeyPatch) -> None:
     angle, V = (v.ravel() for v in np.meshgrid([10.0, 45.0, 90.0, 150.0], [2.0, 6.0, 12.0]))
     near = bemt.propeller("9x6").solve(6000, V, angle_deg=angle)
-    monkeypatch.setattr(oblique, "Near", lambda: None)
+    monkeypatch.setattr(oblique_near, "Near", lambda: None)
     full = bemt.propeller("9x6").solve(6000, V, angle_deg=angle)
     for q in ("CT", "CP"):
         assert np.array_equal(near[q], full[q])

@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 
-from bemt.physics.bem import oblique
+from bemt.physics.bem import oblique_near
 from bemt.rotors.case import case_of, fresh
 from bemt.rotors.case.propagate import propagate
 
@@ -25,11 +25,11 @@ def main() -> int:
     for label in LABELS:
         case = case_of(fresh.label_text(label, measured=False), ends=False)
         angle, J = (v.ravel() for v in np.meshgrid(ANGLES, RATIOS))
-        V, near = J * case.rpm / 60.0 * case.diameter_m, oblique.Near
+        V, near = J * case.rpm / 60.0 * case.diameter_m, oblique_near.Near
         found = propagate(case, None, V, angle_deg=angle).points
-        oblique.Near = lambda: None
+        oblique_near.Near = lambda: None
         full = propagate(case, None, V, angle_deg=angle).points
-        oblique.Near = near
+        oblique_near.Near = near
         for q in ("CT", "CP"):
             off.setdefault(f"{q}, u of the unknowns", []).append(found.u_by["input"][q] / full.u_by["input"][q] - 1.0)
             off.setdefault(f"{q}, u", []).append(found.u[q] / full.u[q] - 1.0)

@@ -31,7 +31,7 @@ from bemt.physics.sections.neuralfoil import neuralfoil_polar
 from bemt.physics.sections.polars import RE_FIXED, Polar
 
 if TYPE_CHECKING:
-    from bemt.physics.bem.oblique import Near
+    from bemt.physics.bem.oblique_near import Near
     from geometry.duct import Duct
     from geometry.rotor import Rotor, Stations
 

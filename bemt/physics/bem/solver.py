@@ -28,7 +28,7 @@ from bemt.physics.sections.polars import ALPHA_GRID
 
 if TYPE_CHECKING:
     from bemt.physics.bem.duct import DuctFlow
-    from bemt.physics.bem.oblique import Near
+    from bemt.physics.bem.oblique_near import Near
     from bemt.physics.sections.polars import Polar
     from geometry.rotor import Rotor, Stations
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from bemt.physics.air import Air
     from bemt.physics.bem.duct import DuctFlow
     from bemt.physics.bem.model import Model
-    from bemt.physics.bem.oblique import Near
+    from bemt.physics.bem.oblique_near import Near
     from bemt.physics.dataset import Dataset
     from bemt.rotors.case.load import Assumption, Case
 
@@ -71,11 +71,11 @@ class Points:
         return Points(case, n.ravel(), V.ravel(), rho.ravel(), angle.ravel())
 
     def solve(self, model: Model | PairModel, changed: Case, threads: int, near: Near | None = None) -> Dataset:
-        """A model of a changed case solved at the points, near the ones solved before unless the points change, too."""
+        """A model of a changed case solved at the points, near the ones solved before unless the wind turns."""
         rpm, V, air = at = self.conditions(changed)
         model = model.at_speeds(*at)
-        one, two = ((c.rpm, c.airspeed_m_s, c.angle_deg, c.air().rho) for c in (self.case, changed))
-        return solve_at(model, rpm, V, self.angles(changed), air, threads, near if one == two else None)
+        turned = changed.angle_deg != self.case.angle_deg
+        return solve_at(model, rpm, V, self.angles(changed), air, threads, None if turned else near)
 
     def angles(self, changed: Case) -> Array:
         """Angle between wind and shaft at the points in a changed case [deg]."""
@@ -281,9 +281,9 @@ def propagate(
     skewed = (points.angle_deg != 0.0) & (points.airspeed_m_s != 0.0)
     near: Near | None = None
     if bands and np.any(skewed):
-        from bemt.physics.bem import oblique
+        from bemt.physics.bem import oblique_near
 
-        near = oblique.Near()
+        near = oblique_near.Near()
     steps, done = 3 + sum(len(item.values) for item in (*declared, *of_second)), 0
 
     def solved(
