@@ -748,5 +748,7 @@ def test_a_row_that_repeats_every_sensor_is_no_second_reading() -> None:
     copied["pwm_s"][-1] = 2e-3
     found = reduce(recording(copied))
     assert len(found) == rpm.size and [d.line for d in reduction(found).dropped] == [rpm.size + 2]
+    wall = {**copied, "wall_distance_m": np.append(np.full(rpm.size, 1.0), 2.0)}  # seen at another place
+    assert len(reduce(recording(wall))) == rpm.size + 1
     two = {k: v for k, v in copied.items() if k != "current_A"}  # two rounded readings may be alike
     assert len(reduce(recording(two))) == rpm.size + 1

@@ -353,7 +353,7 @@ def from_rows(rec: Dataset) -> Found:
     data = _clean(rec, rest, found)
     _wild(rec, data, rest, found)
     copied = _copied(data, len(rec)) & ~rest
-    found.lost += lost(rec, np.flatnonzero(copied), "", "every sensor repeats the row before to the last digit")
+    found.lost += lost(rec, np.flatnonzero(copied), "", "repeats the row before to the last digit")
     time = rec.values.get("time_s")
     loads = [data[name] for name in LOADS if name in data]
     empty = ~np.any([np.isfinite(v) for v in loads], axis=0) if loads else np.ones(len(rec), dtype=bool)
@@ -384,11 +384,11 @@ def from_rows(rec: Dataset) -> Found:
 
 
 def _copied(data: Mapping[str, Array], rows: int) -> NDArray[np.bool_]:
-    """Rows in which three sensors or more, all that there are, read what they read in the row before, (N,)."""
-    sensors = [v for name in SIGNALS if (v := data.get(name)) is not None and moves(v)]
+    """Rows that repeat three readings or more, and all else but the command, of the row before, (N,)."""
+    moving = {name: v for name, v in data.items() if name not in _COMMANDS and moves(v)}
     out = np.zeros(rows, dtype=bool)
-    if len(sensors) >= 3:  # two rounded readings may well be alike
-        out[1:] = np.all([v[1:] == v[:-1] for v in sensors], axis=0)
+    if len(moving.keys() & set(SIGNALS)) >= 3:  # two rounded readings may well be alike
+        out[1:] = np.all([v[1:] == v[:-1] for v in moving.values()], axis=0)
     return out
 
 
