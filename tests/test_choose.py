@@ -283,4 +283,4 @@ def test_an_answer_says_what_stands_in_the_way(capsys: pytest.CaptureFixture[str
     assert main(["choose", *label, "--kv", "80", "200"]) == 1
     assert "200 is the largest K_v that was tried" in capsys.readouterr().out
     assert main(["choose", "--mass-kg", "0.03", "--rotors", "4", "--cells", "1", "--max-diameter-in", "1.6"]) == 2
-    assert "diameter" in capsys.readouterr().err  # not the thrust, which a small rotor makes
+    assert "--max-diameter-in" in capsys.readouterr().err  # not the thrust, which a small rotor makes

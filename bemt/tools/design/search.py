@@ -132,7 +132,8 @@ def choose(
     """Rank propellers and motors; arguments as those of :func:`bemt.choose`.
 
     A row per pair, best first; ``propulsion_g`` is the mass of one rotor's motor, propeller, controller and arm,
-    ``at_N`` the thrust of the power, ``why`` says why it is not the first. Pairs that meet the target with the
+    ``at_N`` the thrust of the power, ``reached`` the probability of thrust and tip Mach number without the time,
+    ``why`` says why it is not the first. Pairs that meet the target with the
     probability `sure` come first: the smallest within 5 % of the least power, the one with the least power, then by
     power. Beside it the target as it was tried, and likewise up to three motors on sale for the first propeller.
     """
@@ -288,7 +289,8 @@ def _no_size(target: Target, small: Sequence[float]) -> Fault:
     hint = "Or more rotors" if target.fan else "Other sizes: name them with --labels"
     if not small:
         expected = f"{target.sizes_in[0]:.3g} in or more, the smallest {what}"
-        return Fault("", "the largest diameter", f"{target.max_diameter_in:.3g} in", expected, hint)
+        where = "--max-diameter-in" if target.arm_m is None else "--arm-mm"
+        return Fault("", where, f"room for {target.max_diameter_in:.3g} in", expected, hint)
     least, most = LOADING["fan" if target.fan else target.fluid]
     low, high = least * _area(small[0]), most * _area(small[-1])
     within = "" if target.max_diameter_in is None else f" within {target.max_diameter_in:.3g} in"
