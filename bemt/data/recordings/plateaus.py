@@ -273,9 +273,9 @@ def _by_signal(v: Array) -> tuple[list[tuple[int, int]], list[Dropped]]:
     for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         if not np.any(jump[a:b] > local[a:b]):  # no more than the noise beside it
             continue
-        if b - a <= 3 * w:  # one step: the peak of the jump is its place
+        if b - a <= 3 * w:  # one step; medians jump as much some samples beside it
             peak = a + int(np.argmax(jump[a:b]))
-            first, last = peak, peak
+            first = last = _split(v, max(at, peak - w), min(peak + w, n))
         else:  # the level moves all the time
             first, last = min(a + w // 2, n), min(b - w // 2, n)
         if first > at:
@@ -286,6 +286,13 @@ def _by_signal(v: Array) -> tuple[list[tuple[int, int]], list[Dropped]]:
     if at < n:
         stretches.append((at, n))
     return stretches, dropped
+
+
+def _split(v: Array, start: int, stop: int) -> int:
+    """Place that leaves the least squares about the means of both sides."""
+    x, k = v[start:stop] - v[start], np.arange(1, stop - start)
+    left = np.cumsum(x)[:-1]
+    return start + 1 + int(np.argmax(left**2 / k + (np.sum(x) - left) ** 2 / (x.size - k)))
 
 
 def _settled(v: Array) -> tuple[int, bool]:

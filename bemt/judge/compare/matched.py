@@ -215,6 +215,8 @@ this. Repeated runs of one stand that were set up anew differ by 1 % in thrust a
 Propeller Database and of J. Majewski's stand, seen here)."""
 BY_POWER = 0.03
 """What the losses of a motor differ by from run to run, where electrical power stands for torque, share."""
+EFFICIENCY = 0.08
+"""The same from reading to reading, beyond their law with the load."""
 # Level of the speed where the voltage is known.
 _AT_KNOWN_VOLTAGE = 0.01
 BY_THERMOMETER = 0.012
@@ -267,8 +269,13 @@ class MatchedChannel:
 
 def like_voltage(a: StandRun, b: StandRun) -> bool:
     """Whether motor and controller work at like voltages, so that electrical power may stand for torque."""
-    v = [np.nanmedian(r.points["voltage_V"]) if "voltage_V" in r.points else math.nan for r in (a, b)]
-    return bool(abs(math.log(v[1] / v[0])) < _LIKE) if all(x > 0.0 for x in v) else False
+    v = [float(np.nanmedian(r.points["voltage_V"])) if "voltage_V" in r.points else math.nan for r in (a, b)]
+    return like_volts(v[0], v[1])
+
+
+def like_volts(a: float, b: float) -> bool:
+    """Whether two voltages [V] are alike; not where one is unknown."""
+    return a > 0.0 and b > 0.0 and abs(math.log(b / a)) < _LIKE
 
 
 def advance(run: StandRun, diameter: float) -> Array:

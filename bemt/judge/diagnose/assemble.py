@@ -11,6 +11,7 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.data.recordings.slips import Level, outlier_runs
+from bemt.judge.compare.matched import BY_POWER, EFFICIENCY, like_volts
 from bemt.judge.diagnose import repeats
 from bemt.judge.diagnose.blade import PLAIN, CalibratedBlade, calibrated, prior_of
 from bemt.judge.diagnose.noise import in_time, loading
@@ -77,6 +78,7 @@ def build(records: Sequence[Record], cases: Sequence[Case], baseline: str = "bem
                                    "readings of this rotor", "Wrong unit, or wrong case?"))  # fmt: skip
     odd = _between(problem, [groups[k][1] for k in order], records)
     problem, found = _calibrated(problem, [groups[k][0] for k in order])
+    problem = _with_power(problem)
     outside: dict[str, list[str]] = {}
     for part, key in zip(problem.parts, order, strict=True):
         whose = "the reference" if part.record.reference else "the recording"
@@ -148,6 +150,51 @@ def _calibrated(problem: Problem, cases: Sequence[Case]) -> tuple[Problem, tuple
         return replace(problem, notes=(*problem.notes, *notes)), found
     whole = assemble(tuple(_with_blade(p, blade.effect) for p in problem.parts), blade)
     return replace(whole, notes=(*whole.notes, *notes)), found
+
+
+def _with_power(problem: Problem) -> Problem:
+    """Problem with the torque that electrical power stands for, where reference and test show no other.
+
+    The losses of motor and controller are what the reference shows of them over speed and advance ratio.
+    """
+    records = [p.record for p in problem.parts]
+    known = next((p for p in problem.parts if p.record.reference), None)
+    if known is None or len(problem.parts) != 2 or any(p.instead is not None for p in problem.parts):
+        return problem
+    shown = all({"electrical_power_W", "voltage_V"} <= r.extra.keys() and "torque_Nm" not in r.measured for r in records)
+    if not shown or not like_volts(*(float(np.median(r.extra["voltage_V"])) for r in records)):
+        return problem
+    losses = _losses(known)
+    return problem if losses is None else assemble(tuple(_by_power(p, losses(p)) for p in problem.parts), problem.blade)
+
+
+def _losses(known: Part) -> Callable[[Part], Array] | None:
+    """Electrical power over that of the shaft as a reference shows it, at the points of a part; None: it does not."""
+    flow, power = known.flow, known.record.extra["electrical_power_W"]
+    good = (flow.Q0 > 0.0) & (power > 0.0)
+    if np.count_nonzero(good) < _FEWEST:
+        return None
+    low, high = np.log(flow.rpm[good].min()), np.log(flow.rpm[good].max())
+
+    def columns(p: Part) -> Array:
+        x = (np.clip(np.log(p.flow.rpm), low, high) - low) / max(high - low, 1e-6)
+        return np.stack([np.ones_like(x), x, x**2, p.flow.J], axis=1)
+
+    y = np.log(power[good] / (flow.omega * flow.Q0)[good])
+    found = np.linalg.lstsq(columns(known)[good], y, rcond=1e-6)[0]
+    return lambda p: np.asarray(np.exp(columns(p) @ found))
+
+
+def _by_power(part: Part, losses: Array) -> Part:
+    """Part with a torque from its electrical power."""
+    record = part.record
+    torque = record.extra["electrical_power_W"] / (part.flow.omega * losses)
+    told = replace(
+        record, measured={**record.measured, "torque_Nm": torque}, u={**record.u, "torque_Nm": EFFICIENCY * np.abs(torque)},
+        zero={**record.zero, "torque_Nm": BY_POWER * float(np.max(np.abs(torque)))}, electrical=True,
+        notes=(*record.notes, "torque: not recorded; electrical power stands for it, with the losses of the reference"),
+    )  # fmt: skip
+    return replace(part, record=told, _solved={})
 
 
 def _with_blade(part: Part, blade: Effect) -> Part:

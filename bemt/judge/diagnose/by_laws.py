@@ -13,7 +13,7 @@ from bemt.base.arrays import Array
 from bemt.judge import loss
 from bemt.judge.compare import recordings
 from bemt.judge.compare.drive_laws import Judgement
-from bemt.judge.compare.matched import BY_POWER, LOADS, MARGIN, SESSION, density_change, like_voltage, log_range
+from bemt.judge.compare.matched import BY_POWER, EFFICIENCY, LOADS, MARGIN, SESSION, density_change, like_voltage, log_range
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import knowledge, posterior, signatures
 from bemt.judge.diagnose.assemble import assemble
@@ -35,8 +35,6 @@ if TYPE_CHECKING:
 
 MOST = 40
 """Points of a recording that are weighed; more are averaged with alike ones [1]."""
-# What a motor's losses may differ by beyond its law with the load, share, where electrical power stands for torque.
-_EFFICIENCY = 0.08
 # Speed at equal command of one motor, natural logarithm: battery and load change it by no more.
 _SAME_DRIVE = 0.06
 # Speed below this share of the largest: a rotor that has just set off.
@@ -260,7 +258,7 @@ def _errors(
         if shift[c]:
             zero[k] = shift[c] * full
         if c == "electrical_power_W":  # a motor takes power without any load
-            u[k], zero[k] = np.hypot(u[k], _EFFICIENCY * y), max(zero.get(k, 0.0), BY_POWER * full)
+            u[k], zero[k] = np.hypot(u[k], EFFICIENCY * y), max(zero.get(k, 0.0), BY_POWER * full)
     return u, zero
 
 

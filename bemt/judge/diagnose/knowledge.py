@@ -134,10 +134,12 @@ _LOADS = {"thrust_N": "thrust", "torque_Nm": "torque"}
 
 
 def possible(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
-    """Candidates without what cannot be: a density that nobody recorded has no wrong unit."""
-    if any(p.record.air_recorded for p in problem.parts if not p.record.reference):
-        return tuple(candidates)
-    kept = (c.only(np.array([s.get("channel") != "density_kg_m3" for s in c.settings])) for c in candidates)
+    """Candidates without what cannot be: what nobody read has no wrong unit and no cell."""
+    tested = [p.record for p in problem.parts if not p.record.reference]
+    unread = set() if any(r.air_recorded for r in tested) else {"density_kg_m3"}
+    unread |= {"torque_Nm"} if any(r.electrical for r in tested) else set()
+    able = (c for c in candidates if effects.catalogue()[c.id].sensor not in unread)
+    kept = (c.only(np.array([s.get("channel") not in unread for s in c.settings])) for c in able)
     return tuple(c for c in kept if c is not None)
 
 

@@ -234,7 +234,7 @@ def rivals(problem: Problem, told: Collection[str] = ()) -> tuple[SmoothAlternat
     """Unknown smooth effects of the test: along each recorded variable but those ``told``, and pairs of them."""
     X: dict[str, Array] = {}
     for name, values in problem.covariates.items():
-        if name in ("run", "Re", "M_tip", "pressure_Pa", *told):
+        if name in ("run", "Re", "M_tip", "pressure_Pa", "electrical_power_W", *told):
             continue
         x = np.log(values) if name == "rpm" and np.all(values > 0) else values
         spread = float(np.ptp(x))
@@ -246,7 +246,9 @@ def rivals(problem: Problem, told: Collection[str] = ()) -> tuple[SmoothAlternat
     p, c = problem.point, problem.channel
     # a cause of the test is not in the reference, whether it is in the library or not
     free = problem.free
-    present = [k for k in (0, 1, 2) if np.any(c == k)]
+    # what the losses of a motor do is smooth, too, and no cause
+    lost = (1,) if any(p.record.electrical for p in problem.parts) else ()
+    present = [k for k in (0, 1, 2) if k not in lost and np.any(c == k)]
     groups = [tuple(present)] if len(present) == 1 else [tuple(present), *((k,) for k in present)]
     out = []
     for names in sets:

@@ -27,8 +27,8 @@ CHANNELS = ("thrust_N", "torque_Nm", "rpm")
 """Readings that may be explained; the speed only where a pulse width was recorded."""
 
 COVARIATES = (
-    "time_s", "temperature_K", "pressure_Pa", "voltage_V", "current_A", "pwm_s", "tip_gap_m", "wall_distance_m",
-    "sideslip_rad", "second_rotor_rad_s", "run",
+    "time_s", "temperature_K", "pressure_Pa", "voltage_V", "current_A", "electrical_power_W", "pwm_s", "tip_gap_m",
+    "wall_distance_m", "sideslip_rad", "second_rotor_rad_s", "run",
 )  # fmt: skip
 """Channels of a series, besides the conditions, that an effect may know."""
 
