@@ -161,8 +161,10 @@ def _with_power(problem: Problem) -> Problem:
     known = next((p for p in problem.parts if p.record.reference), None)
     if known is None or len(problem.parts) != 2 or any(p.instead is not None for p in problem.parts):
         return problem
-    shown = all({"electrical_power_W", "voltage_V"} <= r.extra.keys() and "torque_Nm" not in r.measured for r in records)
-    if not shown or not like_volts(*(float(np.median(r.extra["voltage_V"])) for r in records)):
+    needs = {"electrical_power_W", "voltage_V"}
+    if any("torque_Nm" in r.measured or not needs <= r.extra.keys() for r in records):
+        return problem
+    if not like_volts(*(float(np.median(r.extra["voltage_V"])) for r in records)):
         return problem
     losses = _losses(known)
     return problem if losses is None else assemble(tuple(_by_power(p, losses(p)) for p in problem.parts), problem.blade)
@@ -189,10 +191,10 @@ def _by_power(part: Part, losses: Array) -> Part:
     """Part with a torque from its electrical power."""
     record = part.record
     torque = record.extra["electrical_power_W"] / (part.flow.omega * losses)
+    size, note = np.abs(torque), "torque: not recorded; electrical power stands for it, losses as in the reference"
     told = replace(
-        record, measured={**record.measured, "torque_Nm": torque}, u={**record.u, "torque_Nm": EFFICIENCY * np.abs(torque)},
-        zero={**record.zero, "torque_Nm": BY_POWER * float(np.max(np.abs(torque)))}, electrical=True,
-        notes=(*record.notes, "torque: not recorded; electrical power stands for it, with the losses of the reference"),
+        record, measured={**record.measured, "torque_Nm": torque}, u={**record.u, "torque_Nm": EFFICIENCY * size},
+        zero={**record.zero, "torque_Nm": BY_POWER * float(np.max(size))}, electrical=True, notes=(*record.notes, note),
     )  # fmt: skip
     return replace(part, record=told, _solved={})
 

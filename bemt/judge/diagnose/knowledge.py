@@ -13,7 +13,7 @@ import os
 import shlex
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -140,7 +140,18 @@ def possible(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Candida
     unread |= {"torque_Nm"} if any(r.electrical for r in tested) else set()
     able = (c for c in candidates if effects.catalogue()[c.id].sensor not in unread)
     kept = (c.only(np.array([s.get("channel") not in unread for s in c.settings])) for c in able)
-    return tuple(c for c in kept if c is not None)
+    return tuple(_repaired(problem, c) for c in kept if c is not None)
+
+
+def _repaired(problem: Problem, candidate: Candidate) -> Candidate:
+    """Slips of a channel: those that bring its coefficients back where they can be, if the file shows which do."""
+    told = {c: [e.factor for e in other_rotor.told_units(problem, c)] for c in _LOADS}
+
+    def right(setting: Mapping[str, Any]) -> bool:
+        factors = told.get(setting.get("channel", ""))
+        return not factors or any(math.isclose(setting["factor"] * k, 1.0, rel_tol=1e-3) for k in factors)
+
+    return candidate.only(np.array([right(s) for s in candidate.settings])) or candidate
 
 
 def combined(found: Evidence, change: RunChange | None = None) -> dict[Explanation, float]:
@@ -192,14 +203,12 @@ def another_rotor(P: Mapping[Explanation, float], rotor: Explanation) -> dict[Ex
 
 def _doubted(problem: Problem, P: Mapping[Explanation, float]) -> dict[Explanation, float]:
     """Share of the fault of file or case: of what no listed cause explains where a file cannot be right, of nearly all
-    where repeats differ as on no stand, and of all but slips of units and speed where another rotor is recorded.
+    where repeats differ as on no stand, or another rotor is recorded.
     """  # noqa: D205
     share = DOUBTFUL / (1.0 + DOUBTFUL)
     shown = any(p.record.reference for p in problem.parts)  # a reference shows the rotor
     if other_rotor.foreign(problem) and not shown and not problem.by_laws:
-        odds = DOUBTFUL * other_rotor.odds(problem)
-        lost = {k: p * (odds / (1.0 + odds) if k.ids and k.ids <= set(other_rotor.SLIPS) else share)
-                for k, p in P.items()}  # fmt: skip
+        return _by_level(P, other_rotor.by_level(problem))
     elif other_rotor.unrepeatable(problem):
         lost = {k: share * p for k, p in P.items() if k.ids}
     elif other_rotor.impossible(problem):
@@ -207,6 +216,21 @@ def _doubted(problem: Problem, P: Mapping[Explanation, float]) -> dict[Explanati
     else:
         return dict(P)
     return {**{k: p - lost.get(k, 0.0) for k, p in P.items()}, DOUBT: sum(lost.values())}
+
+
+def _by_level(P: Mapping[Explanation, float], level: Mapping[str, float]) -> dict[Explanation, float]:
+    """Posterior where loads are off by a factor of three: no law is known to a per cent there, and slips of units and
+    of speed are told from each other and from another rotor by the level alone.
+    """  # noqa: D205
+    slips = {k: p for k, p in P.items() if k.ids and k.ids <= set(other_rotor.SLIPS)}
+    weight = {Explanation.of(i): level[i] for i in other_rotor.SLIPS if i in level and Explanation.of(i) in P}
+    weight[DOUBT] = DOUBTFUL * level.get("", 0.0)
+    total, left = sum(weight.values()), 1.0 / (1.0 + DOUBTFUL)
+    out = {k: 0.0 if k in slips else left * p for k, p in P.items()}
+    for k, w in weight.items():
+        out[k] = out.get(k, 0.0) + sum(slips.values()) * (w / total if total > 0.0 else k == DOUBT)
+    out[DOUBT] += 1.0 - sum(out.values())
+    return out
 
 
 def change_of(

@@ -22,6 +22,7 @@ from bemt.physics.effects.base import Effect, RotorBuild
 from bemt.rotors.as_measured import FACTOR
 
 if TYPE_CHECKING:
+    from bemt.base.unit_errors import UnitError
     from bemt.data.recordings.findings import Finding
     from bemt.judge.diagnose.problem import Problem
     from bemt.physics.effects.base import Effect, RotorBuild
@@ -34,6 +35,7 @@ _SHOWN = 3
 _ANGLES_DEG = (-12.0, -9.0, -6.0, -3.0, 3.0, 6.0, 9.0, 12.0, 16.0)
 # Kinds of slips that are another rotor.
 _ROTORS = ("pitch", "chord", "diameter", "blades")
+_SPEEDS = ("poles", "divided twice", "speed")
 _CHORDS = (0.6, 0.7, 0.8, 0.9, 1.1, 1.2, 1.35, 1.5, 1.7)
 _BLADES = (1, 2, 3, 4, 5, 6, 8, 12)
 _ERROR = ": error: "
@@ -110,11 +112,23 @@ def _ranked(found: dict[str, float], slips: Iterable[_Slip]) -> list[Suspect]:
     return sorted(out.values(), key=lambda s: s.distance)
 
 
-def odds(problem: Problem) -> float:
-    """Odds of another rotor over a slip of a unit or of the speed, by the level of the loads alone [1]."""
-    rotor, slip = (min((s.distance for s in suspects(problem) if (s.kind in _ROTORS) is which), default=math.inf)
-                   for which in (True, False))  # fmt: skip
-    return math.exp(min(0.5 * (slip**2 - rotor**2), 50.0)) if math.isfinite(rotor) else 0.0
+def told_units(problem: Problem, channel: str) -> list[UnitError]:
+    """Slips of a channel's unit that bring coefficients and figure of merit of the test back to where they can be."""
+    found = [f for p in problem.parts if not p.record.reference for f in p.record.findings]
+    kind = {CHANNELS[0]: "force", CHANNELS[1]: "torque"}.get(channel)
+    errors = unit_errors.errors(kind) if kind else ()
+    return [e for e in errors if any(f"{channel}: {e.words}" in f for f in found)]
+
+
+def by_level(problem: Problem) -> dict[str, float]:
+    """Likelihood of each effect that is a slip, and "" of another rotor, by the level of the loads alone [1]."""
+    out: dict[str, float] = {}
+    ranked = suspects(problem)
+    nearest = min((s.distance for s in ranked), default=0.0)
+    for s in ranked:
+        effect = "" if s.kind in _ROTORS else "rpm_scale" if s.kind in _SPEEDS else "unit_slip"
+        out[effect] = max(out.get(effect, 0.0), math.exp(0.5 * (nearest**2 - s.distance**2)))
+    return out
 
 
 def nearest_rotors(problem: Problem) -> str:
@@ -147,7 +161,8 @@ def _slips(problem: Problem, found: dict[str, float]) -> Iterator[_Slip]:
     for error in unit_errors.errors("rotation"):
         yield "speed", f"rpm: {error.words}", dict.fromkeys(found, -2.0 * math.log(error.factor)), 1.0 + error.rarity
     for channel, kind in ((T, "force"), (Q, "torque")):
-        for error in unit_errors.errors(kind) if channel in found else ():
+        errors = unit_errors.errors(kind) if channel in found else ()
+        for error in told_units(problem, channel) or errors:
             yield channel, f"{channel}: {error.words}", {channel: math.log(error.factor)}, 1.0 + error.rarity
     changes: list[tuple[str, str, Effect, float]] = [
         ("pitch", f"blade angle {a:+.0f} deg (different pitch)", AsLabelled(angle_deg=a), 0.5) for a in _ANGLES_DEG
