@@ -13,7 +13,7 @@ import os
 import shlex
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -144,14 +144,19 @@ def possible(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Candida
 
 
 def _repaired(problem: Problem, candidate: Candidate) -> Candidate:
-    """Slips of a channel: those that bring its coefficients back where they can be, if the file shows which do."""
-    told = {c: [e.factor for e in other_rotor.told_units(problem, c)] for c in _LOADS}
+    """Slips of units; where loads are off by a factor of three, those that the level tells."""
+    if candidate.id != "unit_slip" or not _unlike(problem):
+        return candidate
+    told = other_rotor.units_by_level(problem)
+    near = [any(s.get("channel") == c and math.isclose(s["factor"], k, rel_tol=1e-3) for c, k in told)
+            for s in candidate.settings]  # fmt: skip
+    return candidate.only(np.array(near)) or candidate
 
-    def right(setting: Mapping[str, Any]) -> bool:
-        factors = told.get(setting.get("channel", ""))
-        return not factors or any(math.isclose(setting["factor"] * k, 1.0, rel_tol=1e-3) for k in factors)
 
-    return candidate.only(np.array([right(s) for s in candidate.settings])) or candidate
+def _unlike(problem: Problem) -> bool:
+    """Whether loads are too far off for any law, and no reference shows that they should be."""
+    shown = any(p.record.reference for p in problem.parts)
+    return other_rotor.foreign(problem) and not shown and not problem.by_laws
 
 
 def combined(found: Evidence, change: RunChange | None = None) -> dict[Explanation, float]:
@@ -206,8 +211,7 @@ def _doubted(problem: Problem, P: Mapping[Explanation, float]) -> dict[Explanati
     where repeats differ as on no stand, or another rotor is recorded.
     """  # noqa: D205
     share = DOUBTFUL / (1.0 + DOUBTFUL)
-    shown = any(p.record.reference for p in problem.parts)  # a reference shows the rotor
-    if other_rotor.foreign(problem) and not shown and not problem.by_laws:
+    if _unlike(problem):
         return _by_level(P, other_rotor.by_level(problem))
     elif other_rotor.unrepeatable(problem):
         lost = {k: share * p for k, p in P.items() if k.ids}

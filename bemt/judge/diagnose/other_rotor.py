@@ -17,12 +17,12 @@ from bemt.base import unit_errors
 from bemt.base.tables import number_text
 from bemt.base.units import INCH
 from bemt.judge.diagnose.blade import AsLabelled
+from bemt.judge.diagnose.form import ALIKE
 from bemt.judge.diagnose.record import CHANNELS
 from bemt.physics.effects.base import Effect, RotorBuild
 from bemt.rotors.as_measured import FACTOR
 
 if TYPE_CHECKING:
-    from bemt.base.unit_errors import UnitError
     from bemt.data.recordings.findings import Finding
     from bemt.judge.diagnose.problem import Problem
     from bemt.physics.effects.base import Effect, RotorBuild
@@ -32,10 +32,12 @@ UNREPEATABLE = 0.10
 # What loads of the right rotor may be off by, natural logarithm; how unusual a slip is adds to its square.
 _OFF = 0.25
 _SHOWN = 3
+# Diameters of propellers that a stand takes, 5 to 15 in: standard deviation of the natural logarithm.
+_SIZES = 0.35
 _ANGLES_DEG = (-12.0, -9.0, -6.0, -3.0, 3.0, 6.0, 9.0, 12.0, 16.0)
 # Kinds of slips that are another rotor.
 _ROTORS = ("pitch", "chord", "diameter", "blades")
-_SPEEDS = ("poles", "divided twice", "speed")
+_COUNTS = ("poles", "divided twice")
 _CHORDS = (0.6, 0.7, 0.8, 0.9, 1.1, 1.2, 1.35, 1.5, 1.7)
 _BLADES = (1, 2, 3, 4, 5, 6, 8, 12)
 _ERROR = ": error: "
@@ -106,18 +108,27 @@ def _ranked(found: dict[str, float], slips: Iterable[_Slip]) -> list[Suspect]:
     """The nearest of each kind, nearest kind first."""
     out: dict[str, Suspect] = {}
     for kind, words, shift, rarity in slips:
-        square = sum((found[c] - shift.get(c, 0.0)) ** 2 for c in found) / _OFF**2 + rarity
+        square = _square(found, shift, rarity)
         if kind not in out or square < out[kind].distance ** 2:
             out[kind] = Suspect(kind, words, math.sqrt(square))
     return sorted(out.values(), key=lambda s: s.distance)
 
 
-def told_units(problem: Problem, channel: str) -> list[UnitError]:
-    """Slips of a channel's unit that bring coefficients and figure of merit of the test back to where they can be."""
-    found = [f for p in problem.parts if not p.record.reference for f in p.record.findings]
-    kind = {CHANNELS[0]: "force", CHANNELS[1]: "torque"}.get(channel)
-    errors = unit_errors.errors(kind) if kind else ()
-    return [e for e in errors if any(f"{channel}: {e.words}" in f for f in found)]
+def units_by_level(problem: Problem) -> list[tuple[str, float]]:
+    """Channel and what its reading is times the truth [1], of the slips of units that leave the loads nearest."""
+    found = {c: math.log(abs(v)) for c, v in levels(problem).items() if v}
+    powers = {CHANNELS[0]: 1.0, CHANNELS[1]: 1.0, "speed": -0.5}
+    some = [
+        (_square(found, shift, rarity), "rpm" if kind == "speed" else kind, powers[kind] * next(iter(shift.values())))
+        for kind, _, shift, rarity in _slips(problem, found) if kind in powers
+    ]  # fmt: skip
+    least = min((square for square, *_ in some), default=0.0)
+    return [(channel, math.exp(size)) for square, channel, size in some if square < least + ALIKE**2]
+
+
+def _square(found: dict[str, float], shift: dict[str, float], rarity: float) -> float:
+    """How far a slip leaves the loads, as a chi-square, and how unusual it is."""
+    return sum((found[c] - shift.get(c, 0.0)) ** 2 for c in found) / _OFF**2 + rarity
 
 
 def by_level(problem: Problem) -> dict[str, float]:
@@ -126,7 +137,7 @@ def by_level(problem: Problem) -> dict[str, float]:
     ranked = suspects(problem)
     nearest = min((s.distance for s in ranked), default=0.0)
     for s in ranked:
-        effect = "" if s.kind in _ROTORS else "rpm_scale" if s.kind in _SPEEDS else "unit_slip"
+        effect = "" if s.kind in _ROTORS else "rpm_scale" if s.kind in _COUNTS else "unit_slip"
         out[effect] = max(out.get(effect, 0.0), math.exp(0.5 * (nearest**2 - s.distance**2)))
     return out
 
@@ -150,7 +161,9 @@ def _slips(problem: Problem, found: dict[str, float]) -> Iterator[_Slip]:
     twice, half = abs(k - math.log(2.0)) < 0.1, abs(k + math.log(2.0)) < 0.1
     hint = ", the case has the radius as diameter" if twice else ", the case has twice the diameter" if half else ""
     size = math.exp(k) * D
-    yield "diameter", f"diameter {size:.3g} m ({size / INCH:.3g} in){hint}", {c: p * k for c, p in powers.items()}, 0.5
+    rarity = 0.5 if hint else 0.5 + (k / _SIZES) ** 2
+    words = f"diameter {size:.3g} m ({size / INCH:.3g} in){hint}"
+    yield "diameter", words, {c: p * k for c, p in powers.items()}, rarity
     for miscount in unit_errors.speed_ratios(rarest=1.0):
         if 1 in (miscount.true, miscount.set):
             off = -2.0 * math.log(miscount.ratio)
@@ -162,7 +175,9 @@ def _slips(problem: Problem, found: dict[str, float]) -> Iterator[_Slip]:
         yield "speed", f"rpm: {error.words}", dict.fromkeys(found, -2.0 * math.log(error.factor)), 1.0 + error.rarity
     for channel, kind in ((T, "force"), (Q, "torque")):
         errors = unit_errors.errors(kind) if channel in found else ()
-        for error in told_units(problem, channel) or errors:
+        # what a figure of merit or a coefficient tells already
+        told = [e for e in errors if any(f"{channel}: {e.words}" in f for f in part.record.findings)]
+        for error in told or errors:
             yield channel, f"{channel}: {error.words}", {channel: math.log(error.factor)}, 1.0 + error.rarity
     changes: list[tuple[str, str, Effect, float]] = [
         ("pitch", f"blade angle {a:+.0f} deg (different pitch)", AsLabelled(angle_deg=a), 0.5) for a in _ANGLES_DEG
