@@ -50,6 +50,37 @@ def test_one_channel_in_another_unit_stays_a_finding_of_its_own() -> None:
     assert all(abs(share) <= 1.0 for share, _ in answer.off.values()) and abs(answer.where.size) <= 1.0
 
 
+def test_a_unit_is_told_where_the_rotor_is_another_one_as_well(tmp_path: Path) -> None:
+    """Newtons under grams, of a rotor of 40 % of the loads: no law holds to a per cent there, the level tells."""
+    values = recording(case(), points("static"), noise=0.005).values
+    rows = zip(values["rpm"], 0.4 * values["thrust_N"], 0.5 * values["torque_Nm"], strict=True)
+    file = tmp_path / "log.csv"
+    file.write_text("rpm,thrust_g,torque_Nm\n" + "".join(f"{n:.0f},{T:.4f},{Q:.6f}\n" for n, T, Q in rows))
+    answer = chain.diagnose([load(str(file), case())], [case()])
+    assert answer.decision.effects == ("unit_slip",)
+    assert answer.parameters["unit_slip"]["channel"].value == "thrust_N"
+    assert answer.parameters["unit_slip"]["unit"].value == "taken for gf"
+
+
+@pytest.mark.parametrize(("power", "named", "not_named"), [(1.0, "thrust_gain", "air_density"),
+                                                          (0.7, "air_density", "thrust_gain")])  # fmt: skip
+def test_electrical_power_stands_for_a_torque_that_nobody_recorded(power: float, named: str, not_named: str) -> None:
+    """Thrust is 30 % low in both: with the power unchanged it is the cell, with the power as low it is the air."""
+    base, given = case(), points("static")
+
+    def run(thrust: float, load: float, seed: int) -> Dataset:
+        values = dict(recording(base, given, noise=0.005, seed=seed).values)
+        shaft = values.pop("torque_Nm") * values["rpm"] * np.pi / 30.0
+        values |= {"thrust_N": thrust * values["thrust_N"], "voltage_V": np.full(len(shaft), 11.1)}
+        del values["density_kg_m3"]
+        return Dataset("bench", "log", {**values, "electrical_power_W": load * shaft / 0.7}, {})
+
+    test, reference = (from_series(s, base) for s in (run(0.7, power, 0), run(1.0, 1.0, 1)))
+    answer = chain.diagnose([test, replace(reference, reference=True)], [base])
+    assert named in answer.decision.effects
+    assert not_named not in answer.decision.effects
+
+
 def test_a_speed_in_another_unit_is_solved_at_the_speed_that_it_was() -> None:
     """Tables for the recorded speeds only would leave a rest, and a second cause for it."""
     base = case()
