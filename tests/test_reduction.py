@@ -755,7 +755,7 @@ def test_a_row_that_repeats_every_sensor_is_no_second_reading() -> None:
 
 
 def test_a_step_is_placed_to_the_sample() -> None:
-    """Twelve samples at each speed, as a script writes them: medians of eight jump as much some rows beside the step."""
+    """Twelve samples a speed, as a script writes them: medians of eight jump as much some rows beside the step."""
     rng = np.random.default_rng(3)
     levels = np.repeat([12e3, 16e3, 20e3, 24e3, 28e3, 32e3], 12)
     rpm = levels + rng.normal(0.0, 15.0, levels.size)

@@ -226,15 +226,12 @@ def _by_level(P: Mapping[Explanation, float], level: Mapping[str, float]) -> dic
     """Posterior where loads are off by a factor of three: no law is known to a per cent there, and slips of units and
     of speed are told from each other and from another rotor by the level alone.
     """  # noqa: D205
-    slips = {k: p for k, p in P.items() if k.ids and k.ids <= set(other_rotor.SLIPS)}
     weight = {Explanation.of(i): level[i] for i in other_rotor.SLIPS if i in level and Explanation.of(i) in P}
-    weight[DOUBT] = DOUBTFUL * level.get("", 0.0)
-    total, left = sum(weight.values()), 1.0 / (1.0 + DOUBTFUL)
-    out = {k: 0.0 if k in slips else left * p for k, p in P.items()}
-    for k, w in weight.items():
-        out[k] = out.get(k, 0.0) + sum(slips.values()) * (w / total if total > 0.0 else k == DOUBT)
-    out[DOUBT] += 1.0 - sum(out.values())
-    return out
+    weight[DOUBT] = max(DOUBTFUL * level.get("", 0.0), 1e-12)
+    slips = {k for k in P if k.ids & set(other_rotor.SLIPS)}
+    out = {k: 0.0 if k in slips else p / (1.0 + DOUBTFUL) for k, p in P.items()}
+    rest = 1.0 - sum(out.values())
+    return out | {k: rest * w / sum(weight.values()) for k, w in weight.items()}
 
 
 def change_of(
