@@ -56,6 +56,10 @@ class GroundEffect(Effect):
         """Refuse unknown forms."""
         choice("form", self.form, FORMS)
 
+    def applies(self, flow: Flow) -> str:
+        """Behind a duct a wall throttles the exit: torque rises, thrust goes either way."""
+        return "what a wall behind a duct does is not modelled" if flow.ducted else ""
+
     def flow(self, flow: Flow) -> None:
         """Take the dammed shares of induced speed and wind off the onset speed."""
         z = flow.extra["wall_distance_m"] / flow.R if "wall_distance_m" in flow.extra else np.array(self.z_over_R)
