@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import hashlib
 import importlib.util
 import json
@@ -25,10 +26,12 @@ from bemt.rotors.case import Case, load_case
 from bemt.tools.cfd.openfoam.write import Run, settings_of
 from bemt.tools.exports import exports, target_ids
 from bemt.tools.exports.base import FEATURES, Files, Job, LoadsExport
+from bemt.tools.exports.blades import baked
 from bemt.tools.exports.flow_solvers import read_profile
 from bemt.tools.exports.folder import export_case
 from bemt.tools.exports.parts import entry
 from bemt.tools.exports.performance import solve_points
+from bemt.tools.exports.vbm import read_vbm
 from geometry import export as module
 from geometry.airfoil import naca4
 from geometry.common import GeometryError
@@ -115,7 +118,7 @@ def save(files: Files, folder: Path) -> Path:
 
 def test_every_target_says_what_it_holds() -> None:
     assert {"jsbsim", "mujoco", "rotorpy", "gazebo", "px4", "ardupilot", "table", "fmu", "rotor-disk",
-            "su2-disk", "flow360", "xrotor", "qprop", "dfdc", "c81"} <= set(exports())  # fmt: skip
+            "su2-disk", "flow360", "vbm", "xrotor", "qprop", "dfdc", "c81"} <= set(exports())  # fmt: skip
     for word, target in exports().items():
         assert target.id == word and target.title and target.holds and target.source and target.conventions
         assert target.kind in ("solid", "loads", "disk", "blade") and target.features <= set(FEATURES)
@@ -525,10 +528,49 @@ def test_rotor_disk_in_openfoam(project: Path, tmp_path: Path, speed: float, han
 @pytest.mark.parametrize("name", ["prop_8x5", "prop_10x5", "prop_12x6", "prop_14x8", "ds30"])
 def test_every_case_becomes_every_disk(project: Path, name: str) -> None:
     asked = Job(load_case(project / f"cases/{name}/case.toml"), airspeed_m_s=25.0)
-    for word in ("rotor-disk", "su2-disk", "flow360", "fan"):
+    for word in ("rotor-disk", "su2-disk", "flow360", "fan", "vbm"):
         files = written(word, asked)
         assert files and all(len(data) > 50 for data in files.values())
         assert "nan" not in " ".join(str(data).lower() for data in files.values() if isinstance(data, str))
+
+
+@pytest.mark.parametrize("speed", [0.0, 12.0])
+@pytest.mark.parametrize("ducted", [False, True])
+def test_a_virtual_blade_has_the_loads_of_the_rotor(job: Job, fan: Job, ducted: bool, speed: float) -> None:
+    """The tables read back by their grammar, at the angles of the point; the gap belongs into the mesh."""
+    asked = (
+        Job(fan.case.replaced({"duct.tip_gap_mm": 0.0}), fan.rpm, speed) if ducted else Job(job.case, job.rpm, speed)
+    )
+    files, p = written("vbm", asked), asked.loading
+    error = entry(exports()["vbm"], asked, files)["fit_error_pct"]
+    assert error["thrust"] < 0.5 and error["torque"] < 0.5
+    rows = list(csv.DictReader(str(files["sections.csv"]).splitlines()))
+    assert (
+        len(rows) <= 20 and float(rows[-1]["r_over_R"]) == 1.0 and float(rows[0]["radius_m"]) == pytest.approx(p.Rhub)
+    )
+    frozen = baked(asked, count=20)
+    for k, row in enumerate(rows):
+        cl, cd = read_vbm(str(files[f"{row['airfoil']}.dat"]))
+        assert (cl.label, cd.label) == ("cl", "cd") and np.all(cd.value > 0.0)
+        assert cl.Re == pytest.approx(frozen.Re[k], rel=1e-4) and cl.M == pytest.approx(frozen.at_M[k], abs=1e-5)
+        star = np.loadtxt(str(files[f"{row['airfoil']}.csv"]).splitlines(), delimiter=",", skiprows=1)
+        machs, angle = np.unique(star[:, 3]), np.degrees(frozen.at_alpha[k])
+        assert machs[0] == 0.0 and machs[-1] >= frozen.at_M.max()
+        for j, table in ((1, cl), (2, cd)):  # both programs read one section
+            at = [np.interp(angle, *star[star[:, 3] == m][:, [0, j]].T) for m in machs]
+            held = np.interp(frozen.at_M[k] ** 2, machs**2, at)
+            assert np.interp(angle, table.alpha_deg, table.value) == pytest.approx(held, abs=2e-4)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["x" * 31 + "\n0\n", "a\n26\n", "a\n1\ncm\n1e5\n0\n2\n-180 0\n180 0\n", "a\n1\ncl\n1e5\n0\n2\n-90 0\n180 0\n",
+     "a\n1\ncl\n1e5\n0\n3\n-180 0\n180 0\n0 0\n", "a\n1\ncl\n1e5\n0\n2\n-180 0\n180 0\n7\n"],
+    ids=["long name", "tables", "label", "half a circle", "falling", "rest"],
+)  # fmt: skip
+def test_an_airfoil_file_that_breaks_the_grammar_of_the_vbm(text: str) -> None:
+    with pytest.raises(ValueError, match="^[ax]"):
+        read_vbm(text)
 
 
 # ---------------------------------------------------------------- blades, there and back

@@ -78,11 +78,13 @@ class RealRotor:
     prior: Prior  # What is known of the latent numbers, after the run if there is one
     drawn: Array  # (K,) Latent numbers with which slopes are taken [units of `bemt.rotors.latents.NAMES`]
     reference: ReferenceRun | None = None  # The run's rows
+    ducted: bool = False
 
     @staticmethod
     def of(model: Model, air: Air, prior: Prior, drawn: Array, reference: ReferenceRun | None = None) -> RealRotor:
         """Rotor of a model in air of one state or one per point."""
-        return RealRotor(coefficients(model, air), model.diameter_m, beta75_deg(model), prior, drawn, reference)
+        D, beta = model.diameter_m, beta75_deg(model)
+        return RealRotor(coefficients(model, air), D, beta, prior, drawn, reference, model.duct is not None)
 
     def at(self, rpm: Array, J: Array, Re: Array) -> Sensed:
         """The solver at points, (P,) each: rpm [rev/min], advance ratio and Reynolds number at 0.75 R [1]."""
@@ -90,7 +92,7 @@ class RealRotor:
 
     def expected(self, at: Sensed) -> Array:
         """Expectation of CT and CP with the solver taken as linear around ``drawn``, (2, P) [1]."""
-        return predict(population(), self._from_drawn, at, None, self.reference).mean
+        return predict(population(self.ducted), self._from_drawn, at, None, self.reference).mean
 
     @property
     def _from_drawn(self) -> Prior:
@@ -98,12 +100,12 @@ class RealRotor:
 
     def tangents(self, at: Sensed) -> Array:
         """Slopes with the latent numbers, less what the run tells of them, CT rows first, (2 P, K) [1 over units]."""
-        T = at.T if self.reference is None else self.reference.near(population(), at)[1]
+        T = at.T if self.reference is None else self.reference.near(population(self.ducted), at)[1]
         return np.asarray(T.transpose(0, 2, 1).reshape(2 * at.J.size, -1))
 
     def rest(self, at: Sensed, other: Sensed | None = None) -> Array:
         """Covariance of what no latent number explains, between points of this rotor, CT rows first, (2 P, 2 Q) [1]."""
-        p, run = population(), self.reference
+        p, run = population(self.ducted), self.reference
         return p.rest(at, other) if run is None else run.rest(p, at, other)
 
     def covariance(self, at: Sensed, other: Sensed | None = None) -> Array:
@@ -113,7 +115,7 @@ class RealRotor:
 
     def predict(self, at: Sensed, mean: Array | None = None) -> Prediction:
         """Expectation and scatter at points; ``mean`` (2, P): the solver at the prior's mean, where that was solved."""
-        return predict(population(), self._from_drawn, at, mean, self.reference)
+        return predict(population(self.ducted), self._from_drawn, at, mean, self.reference)
 
 
 _NODES_J, _NODES_RE, _OCTAVES = 81, 5, 1.0

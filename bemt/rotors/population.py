@@ -17,7 +17,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cache, lru_cache
 from importlib import resources
 from typing import Any
@@ -62,6 +62,7 @@ _QUANTILES = np.array([0.005, 0.03, 0.12, 0.3, 0.5, 0.7, 0.9])
 WEIGHTS = np.array([0.01, 0.04, 0.14, 0.21, 0.2, 0.2, 0.2])
 _ANGLE, _LIFT, _DRAG, _CAMBER = (NAMES.index(n) for n in ("angle_deg", "lift", "drag", "camber_deg"))
 _SHARED = [NAMES.index(n) for n in SHARED]
+_REST = ("local_camber_deg", "local_drag", "rest_CT", "rest_CP", "hover_CT", "hover_CP")
 
 
 def label_angle_deg(pitch_m: float, diameter_m: float) -> float:
@@ -96,6 +97,16 @@ class Family:
     # (3,), (3, 3) Shift of `SHARED` from what is usual, and its covariance [units of `NAMES`]
     mean: Array
     cov: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Ducted:
+    """What ducted rotors whose case is stated say of the rest (`reports/studies/duct_fans.py`)."""
+
+    size: float  # Their rest over that of open rotors: root mean square over families [1]
+    families: int  # Families of them; so many degrees of freedom has what is expected of another one
+    validity: Validity  # Ranges of them
+    provenance: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,6 +160,20 @@ class Population:
     families: Mapping[str, Family] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)  # Folders, propellers, points, command, version
     validity: Validity | None = None  # Ranges of the propellers it was fitted to
+    ducted: Ducted | None = None
+
+    def in_duct(self) -> Population:
+        """Population of ducted rotors: the rest of open ones times `Ducted.size`, with the tails of few families.
+
+        What is known of a blade stays: angle, chord and section do not ask what is around them.
+        """
+        if self.ducted is None:
+            return self
+        rest = {name: self.ducted.size * getattr(self, name) for name in _REST}
+        both = [known for known in (self.validity, self.ducted.validity) if known is not None]
+        return replace(
+            self, **rest, nu_rest=float(self.ducted.families), validity=Validity.of_rotors(both), ducted=None
+        )
 
     @property
     def rest_sizes(self) -> Array:
@@ -288,6 +313,8 @@ class Population:
             raise ValueError(f"got latent numbers {document['latents']}; expected {NAMES}")
         if plain.get("validity") is not None:
             plain["validity"] = Validity.of(plain["validity"])
+        if plain.get("ducted") is not None:
+            plain["ducted"] = Ducted(**{**plain["ducted"], "validity": Validity.of(plain["ducted"]["validity"])})
         plain["between"] = tuple(plain["between"])
         plain["families"] = {
             name: Family(one["offset_deg"], one["offset_sd_deg"], np.array(one["mean"]), np.array(one["cov"]))
@@ -310,7 +337,9 @@ def bias_columns(at: Sensed) -> tuple[Array, Array]:
 
 
 @cache
-def population() -> Population:
-    """The committed population."""
+def population(ducted: bool = False) -> Population:
+    """The committed population: of open rotors, or what it says of ducted ones."""
+    if ducted:
+        return population().in_duct()
     text = resources.files("bemt.rotors").joinpath("population.json").read_text(encoding="utf-8")
     return Population.of(json.loads(text))

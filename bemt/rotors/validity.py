@@ -18,9 +18,8 @@ from the data, each departure adding its own part, with no step at the edge:
   twice. Not a factor: a part of its own.
 * descent: an eighth of the thrust from the induced speed of hover on, less before; Castles and Gray (NACA TN 2474,
   constant chord) are 8 % rms off up to 0.45 of that speed, 13 % from there to 1.6 and 12 % beyond.
-* a duct: nothing. Above 15 % of the static thrust X-22A at two blade angles and nozzle 19A at five pitches are off by
-  0.07 of the band in thrust and 0.16 in torque, rms over the seven (reports/studies/duct_fans.py); what a case leaves
-  open of its duct is in the band as inputs.
+* a duct: nothing, as long as the ducted rotors that were compared cover the point; they have a rest of their own
+  (`bemt.rotors.population.Ducted`). What a case leaves open of its duct is in the band as inputs.
 """
 
 from __future__ import annotations

@@ -7,6 +7,7 @@ fans.
 
 from __future__ import annotations
 
+import argparse
 import csv
 import json
 import math
@@ -19,11 +20,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.tables import json_text, plain, write_atomic
 from bemt.base.units import KGF
 from bemt.rotors.case import Case
 from bemt.rotors.case.load import case_of, load_case
 from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.case.propagate import propagate
+from bemt.rotors.model import RealRotor
+from bemt.rotors.population import WEIGHTS, Ducted, Population, population
+from bemt.rotors.predict import LEVELS, half_width, zero_thrust
+from bemt.rotors.validity import Validity
 
 Array = NDArray[np.float64]
 
@@ -247,19 +253,23 @@ def x22a(data: Path, folder: Path, angle: int) -> Known:
     return Known(f"X-22A, {angle} deg", case, q[:, 1], q[:, 2], q[:, 3] / (2.0 * math.pi), np.full(len(q), math.nan))
 
 
-def nozzle_19a(data: Path, folder: Path, pitch: float) -> Known:
-    """Ka 4-70 of a pitch over diameter in nozzle 19A, in air; the outer wall as in tests/test_duct.py."""
+def nozzle_19a(data: Path, folder: Path, pitch: float, series: str = "4-70") -> Known:
+    """Ka 4-70 or 5-75 of a pitch over diameter in nozzle 19A, in air; the outer wall as in tests/test_duct.py.
+
+    The series have one outline: chords are those of the 4-55 by area ratio over blades.
+    """
     D, L = 0.24, 0.12
+    blades, area = (float(v) for v in series.split("-"))
     g = [[float(v) for v in r.values()] for r in rows(data / "ducted_marine" / "ka4-55_geometry.csv")]
     blade, thick = [], []
     for x, chord_mm, t_over_D, _ in g:
-        chord = chord_mm / 1e3 * 70.0 / 55.0
+        chord = chord_mm / 1e3 * (area / blades) / (55.0 / 4.0)
         blade.append((x, chord / (0.5 * D), math.degrees(math.atan2(pitch, math.pi * x))))
         thick.append(t_over_D * D / chord)
     bore = 0.5e3 * D + 0.8
     body = f"""[rotor]
 kind = "fan"
-blades = 4
+blades = {blades:g}
 diameter_mm = {1e3 * D}
 hub_ratio = 0.167
 [blade]
@@ -284,10 +294,108 @@ rpm = 9000
 density_kg_m3 = 1.225
 """
     found = [r for r in rows(data / "ducted_marine" / "ka_19A_open_water_table.csv")
-             if r["series"] == "Ka4-70_19A" and float(r["P_over_D"]) == pitch]  # fmt: skip
+             if r["series"] == f"Ka{series}_19A" and float(r["P_over_D"]) == pitch]  # fmt: skip
     J, K, N, Q = (np.array([float(r[k]) for r in found]) for k in ("J", "KT_total", "KT_nozzle", "10KQ"))
     case = made(folder, body, stations=stations(blade))
-    return Known(f"Ka 4-70 in 19A, P/D {pitch:g}", case, J, K, Q / 10.0, N / K)
+    return Known(f"Ka {series} in 19A, P/D {pitch:g}", case, J, K, Q / 10.0, N / K)
+
+
+PITCHES = 0.6, 0.8, 1.0, 1.2, 1.4
+LIGHT = 0.15
+"""Share of the static thrust above which errors count [1]."""
+
+
+def x22a_slow(data: Path, folder: Path) -> Known:
+    """X-22A at 19 deg from rest to J 0.2; power between the readings."""
+    known, found = x22a(data, folder, 19), rows(data / "x22a" / "x22a_beta19_full_J_range.csv")
+    T, P = (np.array([[float(r["J"]), float(r["value"])] for r in found if r["quantity"] == name]).T
+            for name in ("CT_total", "CP"))  # fmt: skip
+    J = T[0][T[0] < 0.25]
+    CQ = np.interp(J, *P) / (2.0 * math.pi)
+    return Known("X-22A, 19 deg, slow", known.case, J, T[1][: J.size], CQ, np.full(J.size, math.nan))
+
+
+def stated(data: Path, folder: Path) -> dict[str, list[Known]]:
+    """Ducted rotors whose case is stated, by family: what they have in common counts once.
+
+    Beside DFDC what it does not have is left out of ours. The exit of the X-22A was chosen with its points from J 0.3
+    on in view.
+    """
+    return {
+        "nozzle 19A": [nozzle_19a(data, folder / f"{s}_{p}", p, s) for s in ("4-70", "5-75") for p in PITCHES],
+        "X-22A": [*(x22a(data, folder / str(angle), angle) for angle in (19, 29)), x22a_slow(data, folder / "19")],
+        **{f"{name}, DFDC": [alike(data, name).known] for name in FANS},
+    }
+
+
+@dataclass(frozen=True)
+class Level:
+    """How far a rotor is from ours above `LIGHT`, over what open rotors let expect of the rest."""
+
+    known: Known
+    error: Array  # (2, P) of CT and CP [1]
+    over: Array  # (2, P) the same over the rest's standard deviation of open rotors [1]
+    x: Array  # (P,) Advance ratio over that of zero thrust [1]
+    Re: Array  # (P,)
+    M_tip: Array  # (P,)
+
+    @property
+    def size(self) -> tuple[float, int, float]:
+        """Diameter [m], blades, pitch over diameter."""
+        case = self.known.case
+        return case.diameter_m, int(case.file.rotor.blades), case.rotor().blade.pitch_m() / case.diameter_m
+
+    def inside(self, people: Population, level: float) -> Array:
+        """Share of the points within the rest of a population of ducted rotors, (2,)."""
+        known = people.validity
+        assert known is not None
+        sd = known.at(*self.size, self.x, self.Re, self.M_tip)[0] * people.rest_CT / population().rest_CT
+        held = np.abs(self.over) < half_width(level, sd[:, None] * people.rest_sizes, WEIGHTS)
+        return np.asarray(held.mean(axis=1))
+
+
+def level(known: Known) -> Level:
+    """Errors of a rotor, and where it is."""
+    case = known.case
+    model, told = prepare_case(case), case.as_built()
+    p = model.solve(case.rpm, known.airspeed(known.J), case.air())
+    rotor = RealRotor.of(model, case.air(), told.prior, told.drawn)
+    off = np.array([p.CT - known.CT, p.CP - 2.0 * math.pi * known.CQ])
+    over = off / population().rest_sd(rotor.at(p.rpm, p.J, p.Re75))
+    some = known.CT > LIGHT * known.CT[0]
+    x = p.J / zero_thrust(rotor.solve, told.drawn, case.rpm)
+    error = off / np.array([known.CT, 2.0 * math.pi * known.CQ])
+    return Level(known, error[:, some], over[:, some], x[some], p.Re75[some], p.M_tip[some])
+
+
+def rms(v: Array, axis: int | None = None) -> Array:
+    """Root mean square."""
+    return np.asarray(np.sqrt(np.mean(np.square(v), axis=axis)))
+
+
+def ducted(levels: dict[str, list[Level]]) -> Ducted:
+    """What families of ducted rotors say of the rest: each counts once, thrust and torque alike."""
+    size = rms(np.array([rms(np.array([rms(one.over) for one in family])) for family in levels.values()]))
+    at = [Validity.of_rotor(*one.size, one.x, one.Re, one.M_tip) for family in levels.values() for one in family]
+    about = {"families": list(levels), "command": "reports/studies/duct_fans.py --fit FILE"}
+    return Ducted(float(size), len(levels), Validity.of_rotors(at), about)
+
+
+def left_out(levels: dict[str, list[Level]]) -> list[str]:
+    """Rows of a Markdown table: errors of each rotor, and whether the rest from the other families holds them."""
+    out, held = [], []
+    for name, family in levels.items():
+        others = ducted({k: v for k, v in levels.items() if k != name})
+        people = replace(population(), ducted=others).in_duct()
+        found = np.array([[one.inside(people, k) for k in LEVELS] for one in family])  # rotor, level, load
+        held.append(found.mean(axis=0))
+        for one, shares in zip(family, found, strict=True):
+            T, Q = 100.0 * rms(one.error, axis=1)
+            zT, zQ = rms(one.over, axis=1)
+            cells = " | ".join(f"{100 * v:.0f}" for v in shares.T.ravel())
+            out.append(f"| {one.known.name} | {T:.1f}, {Q:.1f} | {zT:.2f}, {zQ:.2f} | {others.size:.2f} | {cells} |")
+    cells = " | ".join(f"{100 * v:.0f}" for v in np.mean(held, axis=0).T.ravel())
+    return [*out, f"| all families alike | | | {ducted(levels).size:.2f} | {cells} |"]
 
 
 def fan_76(data: Path, folder: Path, pitch_mm: float, duct: bool) -> tuple[Case, Array]:
@@ -357,13 +465,24 @@ def draw(panels: list[list[Known]], to: Path) -> None:
 
 
 def main() -> None:
-    """Print the tables and draw the picture."""
+    """Print the tables and draw the picture, or write the population with what ducted rotors say of its rest."""
+    parser = argparse.ArgumentParser(description="Ducted rotors beside what is known of them.")
+    parser.add_argument("--fit", metavar="FILE", help="write the population with the rest of ducted rotors, no more")
+    to = parser.parse_args().fit
     data = Path(os.environ["BEMT_DATA"])
     with tempfile.TemporaryDirectory() as scratch:
         at = Path(scratch)
+        levels = {name: [level(one) for one in family] for name, family in stated(data, at).items()}
+        if to:
+            found = replace(population(), ducted=ducted(levels))
+            write_atomic(Path(to), json_text(plain(found.document(), 6)))
+            return
+        print("| rotor | error of thrust, torque, % rms | over the rest of open rotors | size of the others | "
+              "thrust inside 68, 95 % | | torque inside | |\n|---|---|---|---|---|---|---|---|")  # fmt: skip
+        print("\n".join(left_out(levels)), "\n")
         first = f1(data, at / "f1")
         x = [x22a(data, at / str(angle), angle) for angle in (19, 29)]
-        ka = [nozzle_19a(data, at / f"ka{pitch}", pitch) for pitch in (0.6, 0.8, 1.0, 1.2, 1.4)]
+        ka = [nozzle_19a(data, at / f"ka{pitch}", pitch) for pitch in PITCHES]
         print("| fan | J | mass flow, kg/s: ours / DFDC | % | share of the duct, %: ours / DFDC | points |")
         print("|---|---|---|---|---|---|")
         for name in FANS:

@@ -206,14 +206,20 @@ stations = {model.stations}
         return load_case(folder / "case.toml")
 
 
-def c81_text(f: Frozen, k: int, name: str) -> str:
-    """One table."""
+def kept_angles(f: Frozen, k: int) -> Array:
+    """Angles of a table that is to be short, (Na,): all near the working point, few elsewhere; 80 at most."""
     near = np.abs(f.alpha - f.at_alpha[k]) <= NEAR
     degrees = np.round(np.degrees(f.alpha), 6)
     fine = (degrees > -30.0) & (degrees < 40.0)
     keep = near | (fine & (degrees % 4.0 == 0.0)) | (~fine & ((degrees % 15.0 == 0.0) | (np.abs(degrees) == 180.0)))
     keep[[0, -1]] = True
-    alpha = degrees[keep]
+    return np.asarray(keep)
+
+
+def c81_text(f: Frozen, k: int, name: str) -> str:
+    """One table."""
+    keep = kept_angles(f, k)
+    alpha = np.round(np.degrees(f.alpha), 6)[keep]
     if alpha.size > 99:  # pragma: no cover - 41 + 17 + 22 angles at most
         raise AssertionError(f"{alpha.size} angles do not fit into C81")
     n_m, n_a = f.M.size, alpha.size
