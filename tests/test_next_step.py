@@ -177,6 +177,29 @@ def test_a_bench_is_not_asked_for_wind_nor_a_tunnel_to_open_a_door(compared: cha
     assert "door" in suggest._check("recirculation", still) and not suggest._check("recirculation", flown)
 
 
+def test_a_repeat_is_weighed_by_the_readings_as_they_would_be_after_it(compared: chain.Diagnosis) -> None:
+    """Each repeat tells less than the one before, and where it tells too little nobody is asked for it."""
+    pair = [suggest.Rival("compressibility", {}, 0.5), suggest.Rival("", {}, 0.5)]
+    of = [None if not r.effect else suggest.effect_of(r.effect, dict(r.settings)) for r in pair]
+    plan, hyper = suggest.assemble(compared.problem.parts[:1]), compared.found.states[0].hyper
+    told = [suggest._distances(plan, of, hyper)[0, 1]]
+    for _ in range(3):
+        repeat = suggest._options(plan.parts[0])[-1]
+        assert "once more" in repeat.text and repeat.rpm.size == len(compared.problem.parts[0].record)
+        plan = suggest._extended(plan, repeat)
+        told.append(suggest._distances(plan, of, hyper)[0, 1])
+    steps = np.diff(told)
+    assert np.all(steps > 0.0) and steps[2] < steps[1] < steps[0]
+
+
+def test_no_repeat_is_asked_for_that_tells_nothing(monkeypatch: pytest.MonkeyPatch, compared: chain.Diagnosis) -> None:
+    monkeypatch.setattr(suggest, "_distances", lambda *_: 0.5 * (1.0 - np.eye(2)))
+    monkeypatch.setattr(suggest, "_check", lambda *_: "")
+    pair = [suggest.Rival("compressibility", {}, 0.5), suggest.Rival("hub_loss", {}, 0.5)]
+    chosen = suggest.suggest(compared.found, pair)
+    assert (chosen.kind, chosen.points) == ("", ()) and "once more would not" in chosen.text
+
+
 @pytest.mark.parametrize("factor", [1.5, 0.7])
 def test_a_wider_blade_is_among_the_rotors_that_fit_the_loads(grid: dict[str, np.ndarray], factor: float) -> None:
     wide = recording(case(), grid, (other_rotor._Chord(factor),))

@@ -625,6 +625,20 @@ def test_a_pair_is_found_one_after_the_other_and_a_model_is_no_run(
     assert [follow.judge(there, course, k)[1] for k in (0, 1)] == [False, True]
 
 
+def test_what_is_named_again_goes_into_the_case_once_more_and_the_search_goes_on(
+    weighed: tuple[items.Bench, Item], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    said = [answer("named", "untwist"), answer("named", "untwist"), answer("sensor", "thrust_gain"),
+            answer("none")]  # fmt: skip
+    course, asked, _ = _followed(weighed, monkeypatch, tmp_path, said)
+    assert course.steps == ["model", "model", "mend"] and course.end == "none"
+    assert len({words[words.index("--case") + 1] for words in asked[:2]}) == 2, "a case of its own each time"
+    assert follow.judge(entry("pair", "untwist", "thrust_gain"), course, 1)[1], "what was named before stays"
+    over = [answer("named", "untwist")] * 4
+    course, asked, _ = _followed(weighed, monkeypatch, tmp_path / "over", over)
+    assert course.steps == ["model", "model"] and course.end == "named again"
+
+
 def test_what_is_claimed_after_the_last_cause_is_wrong_and_forgets_nothing() -> None:
     there = entry("sensor", "thrust_gain")
     said = [answer("sensor", "thrust_gain"), answer("class", "duct", "nacelle")]

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.gaussian.whitening import whitener
@@ -18,6 +19,7 @@ from bemt.judge.diagnose.form import ALIKE
 from bemt.judge.diagnose.nuisance import PRIORS
 from bemt.judge.diagnose.problem import Part, Problem
 from bemt.judge.diagnose.record import Record
+from bemt.judge.diagnose.repeats import conditions
 from bemt.judge.diagnose.signatures import effect_of
 from bemt.physics import effects
 from bemt.physics.air import R_DRY
@@ -172,11 +174,26 @@ def _options(part: Part) -> list[_Option]:
         out.append(
             at("the same static runs with twice the tip gap", spread, static, None, tip_gap_m=2 * now["tip_gap_m"])
         )
-    return out
+    once = _once_each(part)
+    own = {k: v[once] for k, v in record.extra.items() if k not in ("run", "time_s")}
+    return [*out, _Option(f"the same {once.size} points once more", record.rpm[once], record.V[once], {}, own)]
 
 
-def _extended(part: Part, option: _Option) -> Problem:
-    """Plan with the option's points appended to a recording; readings are those of the baseline."""
+def _once_each(part: Part) -> NDArray[np.intp]:
+    """One point of each condition of a recording, in their order."""
+    record = part.record
+    lengths = [v for k, v in record.extra.items() if k in ("wall_distance_m", "tip_gap_m")]
+    label = conditions(record.rpm, part.flow.J, np.broadcast_to(record.air.rho, record.rpm.shape), lengths)
+    first = np.unique(np.where(label < 0, -1 - np.arange(label.size), label), return_index=True)[1]
+    return np.sort(first)
+
+
+def _extended(alone: Problem, option: _Option) -> Problem:
+    """Plan with the option's points appended to a recording; readings are those of the baseline.
+
+    The noise stays as the readings have shown it: beside these the baseline's would look like scatter.
+    """
+    (part,) = alone.parts
     old = part.record
     air_now = {k: float(np.median(getattr(old.air, k))) for k in ("rho", "mu", "a_sound", "temperature_K")}
     air = {k: np.full(option.rpm.size, v * option.change.get(k, 1.0)) for k, v in air_now.items()}
@@ -194,13 +211,16 @@ def _extended(part: Part, option: _Option) -> Problem:
     for c, values in (("thrust_N", flow.T0), ("torque_Nm", flow.Q0)):
         if c in old.measured:
             filled[c] = join([old.measured[c], values[-option.rpm.size :]])
-    u = {}
-    for c, values in filled.items():  # the usual share of a reading that its uncertainty is; NaN where none is stated
-        share = old.u[c] / np.maximum(np.abs(old.measured[c]), 1e-12)
-        usual = np.median(share[known]) if (known := np.isfinite(share)).any() else np.nan
-        u[c] = join([old.u[c], np.abs(values[-option.rpm.size :]) * usual])
+    u = {c: join([old.u[c], np.full(option.rpm.size, np.nan)]) for c in filled}
     record = Record(old.name, rpm, V, both, filled, u, extra, old.gain, old.zero, old.air_recorded)
-    return assemble((replace(part, record=record, flow=flow, _solved={}),))
+    plan = assemble((replace(part, record=record, flow=flow, _solved={}),))
+    sigma = plan.u.copy()
+    for c in np.unique(plan.channel):
+        mine, known = plan.channel == c, alone.channel == c
+        new = np.abs(plan.y[mine][np.count_nonzero(known) :])
+        share = np.median(alone.u[known] / np.maximum(np.abs(alone.y[known]), 1e-12))
+        sigma[mine] = join([alone.u[known], share * new])
+    return replace(plan, u=sigma)
 
 
 def _of_cfd(found: Evidence) -> Suggestion:
@@ -326,7 +346,8 @@ def suggest(found: Evidence, rivals: Sequence[Rival], unknown: float = 0.0, refe
     total = float(doubt.sum()) + of_unknown
 
     part = problem.parts[0]
-    now = _distances(problem if len(problem.parts) == 1 else assemble(problem.parts[:1]), effect, hyper)
+    alone = problem if len(problem.parts) == 1 else assemble(problem.parts[:1])
+    now = _distances(alone, effect, hyper)
     names = tuple(r.effect or "nothing" for r in rivals[:2])
     before = float(now[0, 1])
 
@@ -340,7 +361,7 @@ def suggest(found: Evidence, rivals: Sequence[Rival], unknown: float = 0.0, refe
     choices = []
     for tried in _options(part):
         try:
-            choices.append(choice(tried.text, _points(part.record, tried), _extended(part, tried), "run",
+            choices.append(choice(tried.text, _points(part.record, tried), _extended(alone, tried), "run",
                                   minutes("run", tried.rpm.size)))  # fmt: skip
         except (ValueError, FloatingPointError):
             continue
@@ -353,7 +374,7 @@ def suggest(found: Evidence, rivals: Sequence[Rival], unknown: float = 0.0, refe
     certain = before >= _ENOUGH and not reference
     look = _look(names, part.record)
     worth = [c for c in choices if c.kind == "run" and c.gain * total >= _WORTH]
-    # without a reference, one that tells only the others apart is better than nothing
+    # where no run is able to, one that tells only the others apart is better than nothing
     instead = look or max(worth, key=lambda c: c.gain / c.minutes, default=None)
     if able and not (look and certain):
         other = next((c for c in able if c.kind != able[0].kind), instead if able[0].kind == "reference" else None)
@@ -364,8 +385,8 @@ def suggest(found: Evidence, rivals: Sequence[Rival], unknown: float = 0.0, refe
         return Suggestion("no further run is needed; none would tell more", (), (), before, before, "")
     if reference and not _referenced(found):
         return replace(choices[-1], otherwise=instead)
-    return Suggestion("more repeats of the same points; no other practical run separates them better", (), (), before,
-                      before)  # fmt: skip
+    nothing = "no run that this stand can make separates them; the same points once more would not, either"
+    return instead or Suggestion(nothing, (), (), before, before, "")
 
 
 def _distances(plan: Problem, of: Sequence[effects.Effect | None], hyper: noise.Hyper) -> Array:

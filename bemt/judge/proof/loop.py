@@ -6,8 +6,9 @@ stand; a check by hand ("hang dead weights on the cells") says if it is there.
 
 A cause that was named is put aside, and the same is asked again: is there a second one? A fault of stand or set-up is
 mended, then everything is recorded once more, which is a run. Any other cause stays and goes into the case of the
-recordings (``diagnose --out``), which is none. A name that is not at work changes nothing on the hidden stand and
-stays wrong. The course ends where nothing is left to find, where the same is named again, or without runs.
+recordings (``diagnose --out``), which is none; named again, it goes into the case once more with what was found then in
+place of what was. A name that is not at work changes nothing on the hidden stand and stays wrong. The course ends where
+nothing is left to find, where the same is named over and over, or without runs.
 
 The other road is the fixed programme: a reference, then runs at rest, then runs in wind, whatever the first answer
 was. Its answers stand each for itself.
@@ -123,7 +124,7 @@ class _Item:
     left: int  # Runs
     words: list[str] = field(default_factory=list)
     runs: list[Points] = field(default_factory=list)
-    repeats: int = 0
+    days: int = 0  # How often everything was recorded once more
     aside: list[str] = field(default_factory=list)
     mended: list[str] = field(default_factory=list)
 
@@ -144,26 +145,13 @@ class _Item:
         write_atomic(self.box / name, words)
         return name
 
-    def repeat(self) -> tuple[str, int]:
-        """Measure the points of the recording once more: name of the file and its points, "" if the stand cannot."""
-        words = self.hand.again(self.mended, self._day())
-        if words:
-            write_atomic(self.box / f"repeat_{self.repeats}.csv", words)
-        return (f"repeat_{self.repeats}.csv", words.count("\n") - 1) if words else ("", 0)
-
-    def _day(self) -> int:
-        self.repeats += 1
-        return self.repeats
-
     def mend(self, names: Sequence[str]) -> int:
         """Take causes away, those that are there, and record everything once more; how many points that is."""
         self.mended += self.hand.mend(names)
-        day, points = self._day(), 0
-        texts = {"recording.csv": self.hand.again(self.mended, day)}
+        self.days, points = self.days + 1, 0
+        texts = {"recording.csv": self.hand.again(self.mended, self.days)}
         for k in range(1, len(self.runs) + 1):
-            texts[f"run_{k}.csv"] = self.hand.run(self.runs[:k], self.mended, day)
-        for file in self.box.glob("repeat_*.csv"):
-            texts[file.name] = self.hand.again(self.mended, self._day())
+            texts[f"run_{k}.csv"] = self.hand.run(self.runs[:k], self.mended, self.days)
         for name, words in texts.items():
             if not words:
                 return 0
@@ -209,7 +197,8 @@ def _recommended(item: _Item, answer: ToldAnswer) -> _Taken | str:
 
 def _put_aside(item: _Item, names: Sequence[str], by_check: bool) -> _Taken | str:
     """Mend or model what was named, as far as it is new."""
-    new = [n for n in names if n not in item.aside]
+    # what is in the case is fitted as a whole when it is named again; once, since it may hide another cause
+    new = [n for n in names if item.aside.count(n) < (1 if _at_the_stand(n) else 2)]
     if not new:
         return "named again" if names else "no run"
     faults = [n for n in new if _at_the_stand(n)]
@@ -251,8 +240,9 @@ def _step(item: _Item, step: Step) -> _Taken | str:
     if kind == "reference":
         points = 0 if (item.box / _REFERENCE).exists() else item.reference()
         return _Taken(kind, minutes(kind, points), words) if points else "no reference"
-    name, points = (item.run(step.points), len(step.points)) if step.points else item.repeat()
-    return _Taken(kind, minutes(kind, points), [name if w == _NEW else w for w in words]) if name else "no run"
+    name = item.run(step.points)
+    took = minutes(kind, len(step.points))
+    return _Taken(kind, took, [name if w == _NEW else w for w in words]) if name else "no run"
 
 
 def programme(rig: Rig) -> list[list[dict[str, float]]]:
