@@ -52,7 +52,7 @@ def conditions(case: Case, rpm: Any, airspeed_m_s: Any, J: Any) -> tuple[Array, 
     except ValueError:
         got = ", ".join(f"{value.size} of {name}" for name, value in found.items())
         faults.append(Fault("", ", ".join(shapes), got, "as many of each, or one", "curve() takes every pair"))
-        refuse(faults)
+        raise InputError(faults) from None
     V = found.get("airspeed_m_s", np.asarray(case.airspeed_m_s, dtype=float))
     if "J" in found:
         V = found["J"] * n / 60.0 * case.diameter_m
