@@ -403,7 +403,7 @@ def power_above_input(facts: Facts) -> Iterator[Finding]:
 
 
 USUAL_MERIT = 0.5
-"""Static figure of merit of a propeller, from which the power of its shaft is told without a torque cell: declared [1]."""
+"""Static figure of merit of a propeller, which tells the power of its shaft without a torque cell: declared [1]."""
 
 
 @check_for("power_lost")
