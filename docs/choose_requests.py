@@ -57,7 +57,8 @@ def main() -> None:
     """Rewrite the table."""
     rows = []
     for words, asked in REQUESTS:
-        rows.append(row(words, choose(**asked)))
+        rest = {"rest_kg": 0.6 * asked["mass_kg"]} if "mass_kg" in asked else {}
+        rows.append(row(words, choose(**asked, **rest)))
         print(rows[-1], flush=True)
     text = PAGE.read_text(encoding="utf-8")
     found = re.sub(re.escape(HEAD) + r"(\|.*\n)*", lambda _: HEAD + "\n".join(rows) + "\n", text)

@@ -70,13 +70,27 @@ def test_hover_lifts_the_propulsion_and_what_a_large_rotor_weighs_makes_the_opti
         "labels": ["10x4.5", "15x5", "22x7.5", "32x11"],
         "kv": (100.0, 1200.0),
     }
-    best = choose(**ask).drop_duplicates("label").set_index("label")
+    best = choose(**ask, rest_kg=1.2).drop_duplicates("label").set_index("label")
     lifted = (best.at_N / 9.80665 - 0.001 * best.propulsion_g) * 4
     assert lifted.to_numpy() == pytest.approx(0.6 * 2.0)
     assert best.propulsion_g["32x11"] > 2.0 * best.propulsion_g["15x5"] > 2.0 * best.propulsion_g["10x4.5"]
     assert best.power_W["32x11"] > best.power_W["15x5"] < best.power_W["10x4.5"]
     more = choose(**ask, rest_kg=1.4).set_index("label").loc["15x5"]
     assert more.at_N.max() > best.at_N["15x5"]
+
+
+@pytest.mark.parametrize("more", [{}, {"motors": [KnownMotor("M", 900.0)]}])
+def test_the_first_hovers_the_mass_that_was_asked_for_as_drive_does(more) -> None:
+    found = bemt.choose(cells=4, mass_kg=1.4, rotors=4, max_diameter_in=10.0, capacity_Ah=5.0,
+                        **{"labels": ["9x4", "10x4.5"]} | more)  # fmt: skip
+    first = found.table.iloc[0]
+    assert first.mass_kg == pytest.approx(1.4, rel=0.003) and "hover of 1.4 kg" in str(found).splitlines()[0]
+    rest = found.table.mass_kg - 4e-3 * found.table.propulsion_g
+    assert rest.to_numpy() == pytest.approx(rest[0], rel=1e-3)  # a heavier motor is carried, not taken off the payload
+    told = bemt.drive(first.label, kv=first.kv, cells=4, mass_kg=1.4, rotors=4, capacity_Ah=5.0)
+    same = 0.02 if more else 0.1  # one motor; with K_v alone `choose` has one as large as the thrust asks for
+    assert first.power_W == pytest.approx(told.hover["power_W"].value, rel=same)
+    assert first.minutes == pytest.approx(told.hover["minutes"].value, rel=same)
 
 
 def test_a_frame_limits_the_diameter() -> None:
@@ -277,7 +291,7 @@ def test_three_blades_of_a_racer_need_more_power_than_two() -> None:
 
 def test_an_answer_says_what_stands_in_the_way(capsys: pytest.CaptureFixture[str]) -> None:
     label = ["--labels", "17x6", "--rotors", "4", "--mass-kg", "1.2", "--cells", "4"]
-    assert main(["choose", *label, "--capacity-Ah", "5", "--minutes", "33"]) == 1
+    assert main(["choose", *label, "--rest-kg", "0.72", "--capacity-Ah", "5", "--minutes", "33"]) == 1
     first = capsys.readouterr().out.splitlines()[0]
     assert "nearest is 17x6" in first and "time" in first
     assert main(["choose", *label, "--kv", "80", "200"]) == 1

@@ -120,6 +120,7 @@ class Parser(argparse.ArgumentParser):
         self.register("action", "store", _Once)
         self._words: list[str] = []
         self.like = ""
+        self.elsewhere: Mapping[str, str] = {}
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Parse; an unknown option is answered with the nearest."""
@@ -127,9 +128,11 @@ class Parser(argparse.ArgumentParser):
         known, extra = self.parse_known_args(args, namespace)
         if extra:
             options = [option for action in self._actions for option in action.option_strings]
-            words = [did_you_mean(word.partition("=")[0], options) for word in extra if word.startswith("-")]
+            unknown = dict.fromkeys(word.partition("=")[0] for word in extra if word.startswith("-"))
+            near = {w: self.elsewhere.get(w) or did_you_mean(w, options, 1).strip() for w in unknown}
+            words = [f" {w}: {hint}" if len(unknown) > 1 else f" {hint}" for w, hint in near.items() if hint]
             words += [" Quotes keep words together."] if not extra[0].startswith("-") else []
-            self.error(f"unrecognized arguments: {' '.join(extra)}" + "".join(f".{w}" for w in words if w))
+            self.error(f"unrecognized arguments: {' '.join(extra)}." + "".join(words))
         return known
 
     def error(self, message: str) -> Any:
@@ -163,7 +166,7 @@ def parser_of(function: Callable[..., Any], prog: str = "bemt", everything: bool
         prog=f"{prog} {told.command}", description=described(function)[0], add_help=False,
         epilog=f"{more}example: {prog} {told.example}", formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
-    parser.like = f"{prog} {told.example}"
+    parser.like, parser.elsewhere = f"{prog} {told.example}", told.elsewhere
     for one in all_of_it:
         _add(parser, one, told, everything or one not in hidden)
     parser.add_argument("--json", action="store_true", help="print one JSON document")

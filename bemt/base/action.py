@@ -14,14 +14,14 @@ import html
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 from bemt.base.errors import EXIT_OK, Fault, InputError, refuse
 
 __all__ = [
-    "Declaration", "Count", "Told", "about", "action", "choices_of", "did_you_mean", "in_words",
+    "Answered", "Declaration", "Count", "Told", "about", "action", "choices_of", "did_you_mean", "in_words",
     "in_words_of_the_library", "options_of", "worded",
 ]  # fmt: skip
 
@@ -41,10 +41,41 @@ class Declaration:
     words: tuple[str, ...] = ()  # parameters that are bare words
     common: tuple[str, ...] = ()  # parameters that people use; the rest stands in --help-all
     shown: bool = False  # among the commands of `bemt --help`; the others stand under `bemt lab`
+    elsewhere: Mapping[str, str] = field(default_factory=dict)  # options that people look for here, and where they are
+
+
+class Answered:
+    """What every answer has: ``str()`` is its ``text`` in the words of the library, and a notebook shows it.
+
+    ``to_dict()`` gives what ``--json`` prints, None where a number is not known; ``to_pandas()`` the rows of an answer
+    that has a table.
+    """
+
+    text: Any  # text for a terminal, with options
+
+    def __str__(self) -> str:
+        """Text with parameters in place of options."""
+        return in_words(self.text)
+
+    def _repr_html_(self) -> str:
+        """Show the answer in a notebook."""
+        head = repr(self)[1:-1] if type(self).__repr__ is not object.__repr__ else ""
+        return as_html(head, str(self))
+
+    def to_dict(self) -> Mapping[str, Any]:
+        """Plain values; None where a number is not known."""
+        from bemt.base.tables import plain
+
+        found: Mapping[str, Any] = plain(self._document())
+        return found
+
+    def _document(self) -> Mapping[str, Any]:
+        """What `to_dict` makes plain."""
+        raise NotImplementedError
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
+class Told(Answered):
     """Answer of an action that has no object of its own: a document, its text, and how it ended."""
 
     document: dict[str, Any]
@@ -54,24 +85,20 @@ class Told:
     complaints: tuple[str, ...] = ()  # lines of the error stream
     files: tuple[Path, ...] = ()  # what was written
 
-    def __str__(self) -> str:
-        return in_words(self.text)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values."""
+    def _document(self) -> dict[str, Any]:
         return self.document
 
 
 def action(
     group: str, example: str, *, words: tuple[str, ...] = (), common: tuple[str, ...] = (), shown: bool = False,
-    command: str = "",
+    command: str = "", elsewhere: Mapping[str, str] | None = None,
 ) -> Callable[[Callable[P, T]], Callable[P, T]]:  # fmt: skip
     """Declare a public function as an action."""
 
     def declare(function: Callable[P, T]) -> Callable[P, T]:
         name = command or function.__name__.replace("_", "-")
         found = worded(function)
-        setattr(found, "about", Declaration(name, group, example, words, common, shown))  # noqa: B010
+        setattr(found, "about", Declaration(name, group, example, words, common, shown, elsewhere or {}))  # noqa: B010
         return found
 
     return declare
@@ -143,7 +170,7 @@ def check_choices(choices: Mapping[str, tuple[str, ...]], given: Mapping[str, An
         for one in value if isinstance(value, (list, tuple)) else [value]:
             if one is not None and one not in known:
                 near = did_you_mean(str(one), known).strip()
-                faults.append(Fault("", name, repr(one), f"one of {', '.join(known)}", near))
+                faults.append(Fault("", name, repr(one), f"one of {', '.join(filter(None, known))}", near))
     if faults:
         raise InputError(faults)
 
@@ -165,14 +192,26 @@ def in_words(sentence: str) -> str:
     ('As in thrust_N=27, cells=6', 'Try bemt new --scan FILE')
     >>> in_words("--rpm N; or --case /tmp/a.toml."), in_words("--chord-mm (at 0.75 R)")
     ('rpm=N; or case=/tmp/a.toml.', 'chord_mm (at 0.75 R)')
+    >>> in_words("Add --out recording.toml."), in_words("more flights with --healthy would show; --details tells")
+    ('Add out=recording.toml.', 'more flights with healthy= would show; .details tells')
     """
     if "\n" in sentence:
         return "\n".join(map(in_words, sentence.split("\n")))
     if "--" not in sentence or re.search(r"\bbemt [a-z]", sentence):
         return sentence
-    valued = re.sub(r"(--[a-z][\w-]*) ((?:[\d/'\"]|[A-Z]{1,2}|\w+=)[^\s;`]*[^\s;`.,)]|[A-Z\d](?![\w]))",
+    valued = re.sub(r"(--[a-z][\w-]*) ((?:[\d/'\"]|[A-Z]{1,2}|\w+=)[^\s;`]*[^\s;`.,)]|[A-Z\d](?![\w])|[\w./-]+\.toml)",
                     lambda m: f"{_name(m[1])}={m[2]}", sentence)  # fmt: skip
-    return re.sub(r"(=[\d.]+) (?=[a-zA-Z_]+=)", r"\1, ", re.sub(r"--[a-z][\w-]*", lambda m: _name(m[0]), valued))
+    bare = re.sub(r"--[a-z][\w-]*", lambda m: _ALONE.get(m[0]) or _word(_name(m[0])), valued)
+    return re.sub(r"(=[\d.]+) (?=[a-zA-Z_]+=)", r"\1, ", bare)
+
+
+_ALONE = {"--details": ".details", "--json": ".to_dict()"}
+"""Options of the command line that are no parameters, as an answer has them."""
+
+
+def _word(name: str) -> str:
+    """A parameter in a sentence: one of a single plain word is marked as such."""
+    return name if "_" in name else f"{name}="
 
 
 def _name(option: str) -> str:
@@ -192,14 +231,15 @@ def in_words_of_the_library(keys: dict[str, str] | None = None, file: str = "") 
         faults = [_named(fault, keys or {}, file) for fault in error.faults]
         if faults == list(error.faults):
             raise
-        raise InputError(faults) from error
+        raise InputError(faults) from None
 
 
 def _named(fault: Fault, keys: dict[str, str], file: str) -> Fault:
     if fault.file == file and fault.where in keys:
         fault = replace(fault, file="", where=keys[fault.where])
-    parts = {key: in_words(getattr(fault, key)) for key in ("file", "where", "expected", "hint")}
-    return replace(fault, **parts)
+    parts = {key: in_words(getattr(fault, key)) for key in ("expected", "hint")}
+    places = {key: re.sub(r"--[a-z][\w-]*", lambda m: _name(m[0]), getattr(fault, key)) for key in ("file", "where")}
+    return replace(fault, **places, **parts)
 
 
 def options_of(fault: Fault) -> Fault:

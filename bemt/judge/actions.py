@@ -75,7 +75,7 @@ def diagnose(
     top_rpm : float, optional
         Fastest that the stand may run: no run beyond it is asked for. [rev/min]
     unit, column, sign : mapping
-        Runs of CFD: what their exports do not say, as `import` takes it: thrust=N, thrust=fz, torque=-1.
+        What the headings of every table, or the exports of a CFD run, do not say: thrust=N, thrust=fz, torque=-1.
     zones : sequence of str
         Runs of CFD: zones whose loads count.
     along : path, optional
@@ -152,7 +152,7 @@ def compare(
     rpm : float, optional
         One CFD run: its speed, where no file states it. [rev/min]
     unit, column, sign : mapping
-        One CFD run: what its exports do not say, as `import` takes it: thrust=N, thrust=fz, torque=-1.
+        What the headings of both tables, or the exports of one CFD run, do not say: thrust=N, thrust=fz, torque=-1.
     zones : sequence of str
         One CFD run: zones whose loads count.
     out : path, optional

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -74,7 +75,7 @@ def import_(
         How it was computed: cells=2.1e6 grid_level=fine turbulence='k-omega SST' solver=pressure steady=no gci_pct=2;
         cells=0.5e6,1.7e6,5.8e6 makes a grid study of three files.
     out : path, optional
-        File that keeps what you state, run.toml, study.toml of several grids or recording.toml; every command takes it
+        File that keeps what you state: run.toml, study.toml of several grids or recording.toml; every command takes it
         in place of the files.
 
     Returns
@@ -110,23 +111,30 @@ def import_(
     told: dict[str, list[str]] = {"unit": words(unit), "column": words(column), "sign": words(sign)}
     run: dict[str, Any] = {"sector": sector, "zones": list(zones), "axis": axis, "airspeed_m_s": airspeed_m_s,
            "density_kg_m3": density_kg_m3, "reference": words(reference), "setup": words(setup)}  # fmt: skip
+    stated: dict[str, Any] = {}
+    said = ""
     lines, insist = [], any(told.values()) or any(run.values()) or bool(out is not None or pole_pairs)
-    if insist and (table := _table(names, run)):
+    table = names[0] if len(names) == 1 and not any(run.values()) and load.is_measured(names[0]) else ""
+    if insist and table and (out is not None or pole_pairs):
         from bemt.data.recordings.cfd_options import write_recording
 
-        if out is None:
+        if out is None:  # pole pairs are of the rotor, which a file keeps
             hint = f"Add --out {Path(table).with_name('recording.toml').as_posix()}"
             raise InputError(Fault("", "--out", "nothing", "a recording.toml that keeps what you state", hint))
-        stated = told["unit"], told["column"], told["sign"], pole_pairs
-        written = write_recording(table, os.fspath(out), *stated).as_posix()
+        facts = told["unit"], told["column"], told["sign"], pole_pairs
+        written = write_recording(table, os.fspath(out), *facts).as_posix()
         kept = written
         names, told, out, insist = [written], dict.fromkeys(told, []), None, False
+    elif insist and table:
+        stated = {table: load.as_stated([table], told)[0]}
+        said = " ".join(shlex.join([f"--{name}", *given]) for name, given in told.items() if given)
+        told, insist = dict.fromkeys(told, []), False
     elif pole_pairs:
         raise InputError(Fault("", "--pole-pairs", f"{pole_pairs} with these files", "one table of measurements"))
     speed = None if choice.period is None else 60.0 / choice.period
     made = cfd_options.run_from(names, rpm=speed, revolutions=revolutions, **run, unit=told["unit"],
                                 column=told["column"], sign=told["sign"])  # fmt: skip
-    found = load.import_files(names, format, choice, made, insist)
+    found = load.import_files(names, format, choice, made, insist, stated)
     if out is not None and found.runs:
         own = made.run.model_copy(update={"files": found.runs[-1].files})
         made = made.model_copy(update={"run": own})
@@ -134,35 +142,20 @@ def import_(
     document = found.document()
     if case is not None:
         runs: list[Any] = [] if wrote else load.runs_of(names, made)[0]  # as the options say, not as the files do
-        rest = [f.path for f in found.files if f.record is None or f.record.kind != "cfd"] if runs else names
+        left = [f.path for f in found.files if f.record is None or f.record.kind != "cfd"] if runs else names
+        rest = [stated.get(name, name) for name in left]
         seen = [wrote] if wrote else [*runs, *rest]
         sentence, document["prediction"] = _beside(seen, case, picture, rpm, airspeed_m_s, bool(wrote or runs))
         lines.append(f"{sentence}\n")
     if kept and not found.runs:
         lines.insert(0, f"{kept} written\n")
-    text = "\n".join([*lines, found.text(wrote or (kept if found.runs else ""))])
+    text = "\n".join([*lines, found.text(wrote or (kept if found.runs else ""), said)])
     return Told(document, text, exit_code=found.exit_code, complaints=found.complaints)
 
 
 def words(given: Mapping[str, str]) -> list[str]:
     """``NAME=VALUE`` of a mapping; the empty name stands for all."""
     return [f"{name}={value}" if name else str(value) for name, value in given.items()]
-
-
-def _table(files: Sequence[str], run: Mapping[str, object]) -> str | None:
-    """The one table of measurements whose columns the options are about; None where they are about a CFD run."""
-    from bemt.base.errors import InputError
-    from bemt.data import readers
-    from bemt.data.readers.cfd_run import KIND as RUN
-    from bemt.data.recordings.cfd_files import PROGRAMS
-
-    if len(files) != 1 or any(run.values()) or Path(files[0]).is_dir():
-        return None
-    try:
-        kind = readers.detect(files[0])
-    except InputError:
-        return None
-    return None if kind in PROGRAMS or kind == RUN else files[0]
 
 
 def _beside(

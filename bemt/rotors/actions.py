@@ -22,6 +22,7 @@ __all__ = ["calibrate", "cite", "estimate", "measured_rotors", "new", "stations"
 @action(
     "Propellers and fans", "estimate 10x5 --rpm 6000", words=("label",), shown=True,
     common=("rpm", "airspeed_m_s", "blades", "chord_mm", "series", "reading", "angle_deg"),
+    elsewhere={"--duct": "A duct is [duct] in the case (docs/duct.md); bemt new DIAMETER --fan writes one."},
 )  # fmt: skip
 def estimate(
     label: str, rpm: ArrayLike, airspeed_m_s: ArrayLike = 0.0, *, blades: Count | None = None,
@@ -88,6 +89,7 @@ def estimate(
 @action(
     "Propellers and fans", "new 10x5", words=("label",), shown=True,
     common=("stations", "scan", "fan", "blades", "kv", "cells", "rpm", "out"),
+    elsewhere={"--duct": "A duct is [duct] in the case (docs/duct.md); bemt new DIAMETER --fan writes one."},
 )  # fmt: skip
 def new(
     label: str | None = None, *, stations: str | os.PathLike[str] | None = None,
@@ -151,6 +153,7 @@ def new(
     next: bemt sweep /.../mine
     """
     import os
+    import re
     import shlex
 
     from bemt.base.errors import Fault, InputError
@@ -165,6 +168,8 @@ def new(
                                cells, campaign, None if reading is None else reading_text(reading),
                                diameter_in is not None)  # fmt: skip
     folder, files, notes = new_folder.write(wanted, None if out is None else os.fspath(out))
+    if fan and label and re.fullmatch(r"[\d.]+x[\d.]+(x\d+)?", label):
+        notes = [*notes, f"the chord, hub and sections are those of ducted fans, not of a propeller {label}"]
     typed = shlex.quote(folder.as_posix())
     lines = [
         f"{folder.as_posix()}: {', '.join(files)}",

@@ -143,8 +143,9 @@ class Propeller:
         Returns
         -------
         Dataset
-            Kind ``bemt``. A point without a solution is NaN and flagged, never zero. A point that no measured rotor
-            covers is flagged, and its band is wider. With an angle it also has ``sideslip_rad``, ``H_force_N`` (in the
+            Kind ``bemt``; every channel is (N,), the arguments broadcast and flattened in C order. A point without a
+            solution is NaN and flagged, never zero. A point that no measured rotor covers is flagged, and its band is
+            wider. With an angle it also has ``sideslip_rad``, ``H_force_N`` (in the
             plane of the disk, downstream), ``Y_force_N`` (to the advancing side), ``roll_moment_Nm`` (lifts the
             advancing side) and ``pitch_moment_Nm`` (lifts the upstream side), all without a band.
 
@@ -263,7 +264,8 @@ class Propeller:
         Returns
         -------
         Dataset
-            One point per pair, with the speed of rotation as the outer loop.
+            One point per pair, every channel (N,) with the speed of rotation as the outer loop: over one speed
+            ``d.thrust_N.reshape(len(rpm), -1)[i]``.
 
         Examples
         --------

@@ -384,8 +384,9 @@ _MEANINGS = ("rpm", "thrust", "torque", "voltage", "current", "power", "time", "
 def _asked(headings: Sequence[str], channels: Iterable[str]) -> list[str]:
     """Options of ``bemt import`` that state the unit of headings whose words are one quantity."""
     out: dict[str, str] = {}
-    for label in headings:
-        name = label[1:].rsplit("'", 1)[0].split("' (")[0]
+    names = [label[1:].rsplit("'", 1)[0].split("' (")[0] for label in headings]
+    channels = {*channels} - {slug(name) for name in names}
+    for name in names:
         found = set(meanings(name))
         found -= {"pulse_width"} if "throttle" in found else set()
         quantity = found.pop() if len(found) == 1 else ""

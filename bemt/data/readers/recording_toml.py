@@ -220,19 +220,24 @@ def read(path: str | os.PathLike[str]) -> Dataset:
     _check_poles(out, document or {})
     if made is None or out.faults:
         raise InputError(out.faults)
+    return joined(made, Path(path).parent, out.file)
+
+
+def joined(made: RecordingToml, folder: Path, file: str) -> Dataset:
+    """Tables of a recording in a folder with its map applied; `file` is what its faults and provenance name."""
     head, constants = made.recording, made.rotor.constants() | made.stand.constants() | made.air.constants()
     runs: list[Dataset] = []
     faults: list[Fault] = []
     for name in head.files:
         with gathered(faults):
-            runs.append(_run(out.file, Path(path).with_name(name), made))
+            runs.append(_run(file, folder / name, made))
     refuse(faults)
     joined = _join(runs, head.files)
     warnings = list(joined.notes)
     air = {"pressure_Pa", "temperature_K"} <= joined.values.keys() or "density_kg_m3" in joined
     if "density_kg_m3" not in constants and not air:
         warnings.append("no air state: coefficients need a density ([air] in the recording)")
-    said = {"recording": out.file, **{k: v for k, v in head.given().items() if isinstance(v, str) and k != "file"}}
+    said = {"recording": file, **{k: v for k, v in head.given().items() if isinstance(v, str) and k != "file"}}
     for name, facts in (("rotor", made.rotor), ("stand", made.stand)):
         said |= {f"{name}_{k}": v for k, v in facts.given().items() if isinstance(v, str)}
     told = {"constants": constants, "instrument": _instrument(made.columns)}

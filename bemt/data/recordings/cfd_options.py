@@ -1,4 +1,4 @@
-"""A run of CFD from what a user types: units, signs, zones and set-up of the options become a `RunToml`."""
+"""What a user types of a recording: units, columns and signs of a table, or of a run of CFD with zones and set-up."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from bemt.base import units
 from bemt.base.errors import Fault, InputError, refuse
@@ -358,15 +359,27 @@ def write_recording(
         faults.append(Fault("", "--out", out, f"a file in the folder of {Path(file).name}", "Both stay together"))
     if path.exists():
         faults.append(Fault(path.as_posix(), "", "a file that exists", "a new name", "Add the lines to it by hand"))
+    document = recording_from(file, unit, column, sign, pole_pairs, faults)
+    inline = {name: tomlkit.inline_table() for name in document["columns"]}
+    for name, facts in document["columns"].items():
+        inline[name].update(facts)
+    text = tomlkit.dumps(document | {"columns": inline})
+    write_atomic(path, "# Written by bemt import. Give this file in place of the table.\n" + text)
+    return path
+
+
+def recording_from(
+    file: str, unit: Iterable[str] = (), column: Iterable[str] = (), sign: Sequence[str] = (),
+    pole_pairs: int | None = None, faults: Sequence[Fault] = (),
+) -> dict[str, Any]:  # fmt: skip
+    """Tables of a recording.toml from what options say of a table of measurements; their faults come after `faults`."""
+    faults = list(faults)
     table = split_table(load_text(file))
     headings = _Measured([h for h in table.headings if h], {}, _read_as(file))
     loads = [q for q in ("thrust", "torque") if q in headings.read_as]
     if loads and list(sign) in (["-1"], ["1"]):  # turns all
         sign = [f"{q}={text}" for q in loads for text in sign]
-    columns: dict[str, Facts] = {}
-    _gather("--column", column, headings.column, columns, faults)
-    _gather("--unit", unit, headings.unit, columns, faults)
-    _gather("--sign", sign, headings.sign, columns, faults)
+    columns = _facts(headings, unit, column, sign, faults)
     if not (columns or faults):
         columns = headings.plain()
     if pole_pairs:
@@ -375,13 +388,46 @@ def write_recording(
         faults += headings.complete(quantity, facts)
     refuse(faults)
     head = {"file": Path(file).name} | ({"decimal": ","} if decimal_mark(table) == "," else {})
-    out_faults = Collector(os.fspath(path))
-    rotor = {"rotor": {"pole_pairs": pole_pairs}} if pole_pairs else {}
-    validated(RecordingToml, {"recording": head, "columns": columns, **rotor}, out_faults)
-    out_faults.check()
-    inline = {name: tomlkit.inline_table() for name in columns}
-    for name, facts in columns.items():
-        inline[name].update(facts)
-    document = {"recording": head, "columns": inline, **rotor}
-    write_atomic(path, "# Written by bemt import. Give this file in place of the table.\n" + tomlkit.dumps(document))
-    return path
+    out = Collector(file)
+    document = {"recording": head, "columns": columns} | ({"rotor": {"pole_pairs": pole_pairs}} if pole_pairs else {})
+    validated(RecordingToml, document, out)
+    out.check()
+    return document
+
+
+def stated_frame(frame: Any, unit: Iterable[str] = (), column: Iterable[str] = (), sign: Sequence[str] = ()) -> Any:
+    """A DataFrame with what is said of its columns in their names, as `from_pandas` reads them.
+
+    >>> import pandas as pd
+    >>> told = stated_frame(pd.DataFrame({"n": [100.0], "F": [2.0]}), ["F=gf"], ["rpm=n", "thrust=F"], ["thrust=-1"])
+    Traceback (most recent call last):
+        ...
+    bemt.base.errors.InputError: --unit: got no unit for rpm; expected --unit rpm= rpm or rad_s or rev_s or Hz.
+    >>> stated_frame(pd.DataFrame({"rpm": [6000.0], "F": [2.0]}), ["F=gf"], ["thrust=F"], ["thrust=-1"]).to_dict("list")
+    {'rpm': [6000.0], 'thrust_gf': [-2.0]}
+    """
+    faults: list[Fault] = []
+    headings = _Measured([str(h) for h in frame.columns])
+    columns = _facts(headings, unit, column, sign, faults)
+    for quantity, facts in columns.items():
+        faults += headings.complete(quantity, facts)
+    refuse(faults)
+    out = frame.rename(columns=str)
+    for quantity, facts in columns.items():
+        told = units.UNITS[str(facts["unit"])]
+        turning = CHANNELS[quantity] == "angular_speed"
+        factor = float(facts.get("sign", 1)) * (told.factor / units.RPM if turning else 1.0)
+        out[facts["column"]] = out[facts["column"]] * factor
+        out = out.rename(columns={facts["column"]: quantity if turning else f"{quantity}_{told.suffix}"})
+    return out
+
+
+def _facts(
+    headings: _Measured, unit: Iterable[str], column: Iterable[str], sign: Sequence[str], faults: list[Fault]
+) -> dict[str, Facts]:
+    """What options say of the columns of a table."""
+    columns: dict[str, Facts] = {}
+    _gather("--column", column, headings.column, columns, faults)
+    _gather("--unit", unit, headings.unit, columns, faults)
+    _gather("--sign", sign, headings.sign, columns, faults)
+    return columns

@@ -15,6 +15,7 @@ from bemt.base.units import ZERO_CELSIUS
 from bemt.data.readers.samples import lone
 from bemt.data.recordings.channels import shaft_power
 from bemt.data.recordings.findings import (
+    MOTOR_EFFICIENCY,
     Facts,
     Finding,
     check_for,
@@ -395,7 +396,40 @@ def power_above_input(facts: Facts) -> Iterator[Finding]:
         text = f"{words} exceeds the electrical power in {len(rows)} of {int(facts.loaded.sum())} rows under load "
         text += f"({where_of(facts, rows)}), {np.max(ratio[odd]):.4g} times at most"
         fix = "unit or gain of the torque, electrical revolutions taken for mechanical, or unit of voltage or current"
+        lightest = facts.loaded & ~odd
+        if np.any(lightest) and float(np.median(electric[odd])) < float(np.median(electric[lightest])):
+            fix = f"at part throttle only: a sensor that reads chopped current low; or {fix}"
         yield Finding("power_above_input", words, text, fix, rows_of(odd), contradicts(odd, facts.loaded))
+
+
+USUAL_MERIT = 0.5
+"""Static figure of merit of a propeller, which tells the power of its shaft without a torque cell: declared [1]."""
+
+
+@check_for("power_lost")
+def power_lost(facts: Facts) -> Iterator[Finding]:
+    """Far more power into the motor than its shaft takes; without a torque, than a usual rotor of that thrust takes."""
+    electric, rows, words = facts.filled.get("electrical_power_W"), facts.loaded, "the shaft takes"
+    shaft = shaft_power(facts.filled)
+    if electric is None or facts.bare:
+        return
+    if shaft is None or not np.any(np.isfinite(shaft[rows])):
+        T, rpm, D = facts.filled.get("thrust_N"), facts.rpm, facts.diameter_m
+        if T is None or (D is None and rpm is None) or facts.ducted:
+            return
+        with np.errstate(all="ignore"):
+            disk = (np.abs(T) / (0.1 * facts.rho * (rpm / 60.0) ** 2)) ** 0.25 if D is None and rpm is not None else D
+            shaft = np.abs(T) ** 1.5 / np.sqrt(0.5 * math.pi * facts.rho) / disk / USUAL_MERIT
+        rows, words = facts.loaded & facts.still & (T > 0.0), "by its thrust the shaft takes about"
+    with np.errstate(all="ignore"):
+        ratio = (np.abs(shaft) / electric)[rows]
+    ratio = ratio[np.isfinite(ratio)]
+    if ratio.size < 3 or not 0.0 < float(np.median(ratio)) < MOTOR_EFFICIENCY[0]:
+        return
+    text = f"{words} {np.median(ratio):.0%} of it ({np.min(ratio):.0%} to {np.max(ratio):.0%} under load); "
+    text += f"a loaded motor turns {MOTOR_EFFICIENCY[0]:.0%} or more into power of the shaft"
+    fix = "check unit, gain and zero of the current and of the voltage; or several motors are on that supply"
+    yield Finding("power_lost", facts.named("electrical_power_W"), text, fix, (), "warning")
 
 
 @check_for("merit")

@@ -204,6 +204,10 @@ def where_of(facts: Facts, rows: Array | NDArray[np.intp]) -> str:
 _LOG, _FEW_ROWS = 100, 0.2
 
 
+MOTOR_EFFICIENCY = (0.2, 0.95)
+"""Range of a motor's efficiency under load: declared [1]."""
+
+
 def enough(odd: NDArray[np.bool_], among: NDArray[np.bool_]) -> bool:
     """Whether rows are more than the transients and spikes of a log: one in a table, 1 % of many."""
     return bool(np.any(odd)) and float(odd.sum()) > 0.01 * (float(among.sum()) if len(odd) >= MANY else 0.0)

@@ -71,6 +71,11 @@ def import_file(path: str | os.PathLike[str], format: str | None = None, choice:
     record = adapt(found, kind, name)
     if record is not found:  # made from a series, a polar, a geometry: no recording of a stand
         record = replace(record, provenance={**record.provenance, "adapted": type(found).__name__})
+    return _finished(record, choice)
+
+
+def _finished(record: Dataset, choice: Choice) -> Dataset:
+    """What was read, averaged as asked, as a study of grids where it is one, with a note on means that move."""
     if choice.period is not None:
         record = averaged(record, choice.period, choice.revolutions)
     elif record.format in ("table", "recording"):
@@ -172,9 +177,9 @@ def _before(name: str, start: float) -> bool:
 
 def import_files(
     paths: Iterable[str | os.PathLike[str]], format: str | None = None, choice: Choice | None = None,  # noqa: A002
-    run: RunToml | None = None, insist: bool = False,
+    run: RunToml | None = None, insist: bool = False, stated: Mapping[str, Dataset] = {},  # noqa: B006
 ) -> Imported:  # fmt: skip
-    """Read files; with ``insist`` they must be the CFD run of ``run``."""
+    """Read files, those of `stated` as the user states them; with ``insist`` they must be the CFD run of ``run``."""
     names = [os.fspath(path) for path in paths]
     runs, to_do = runs_of(names, run, insist)
     if runs or to_do:
@@ -183,7 +188,7 @@ def import_files(
     errors: dict[str, str] = {}
     for name in names:
         try:
-            records[name] = import_file(name, format, choice)
+            records[name] = stated[name] if name in stated else import_file(name, format, choice)
         except Exception as error:  # the other files are read all the same
             errors[name] = _refusal(error)
     exports = {n: other_than_loads(r.values) for n, r in records.items() if r.kind == "cfd" and not cfd_run.is_run(r)}
@@ -199,12 +204,41 @@ def import_files(
 
 
 def as_stated(files: Sequence[Any], run: Mapping[str, Any]) -> list[Any]:
-    """CFD run of exports, together, with what they do not say; the files themselves where nothing is stated."""
+    """Recordings with what the user states of them; the files themselves where nothing is.
+
+    Tables of measurements, and DataFrames, each for itself; exports of CFD are one run, together.
+    """
     if not any(v is not None and v != [] for v in run.values()):
         return list(files)
-    from bemt.data.recordings.cfd_options import run_from
+    from bemt.data.recordings.cfd_options import run_from, stated_frame
 
+    if not run.get("zones") and all(hasattr(f, "columns") or is_measured(f) for f in files):
+        told = [run.get(name) or [] for name in ("unit", "column", "sign")]
+        if not any(told):
+            return list(files)
+        return [stated_frame(f, *told) if hasattr(f, "columns") else _stated(f, *told) for f in files]
     return list(runs_of(files, run_from(list(files), **run), insist=True)[0])
+
+
+def is_measured(file: Any) -> bool:
+    """Whether a file is a table of measurements, of whose columns units, headings and signs may be stated."""
+    if not isinstance(file, str) or Path(file).is_dir():
+        return False
+    try:
+        kind = importers.detect(file)
+    except InputError:
+        return False
+    return kind not in PROGRAMS and kind != RUN
+
+
+def _stated(file: str, unit: Sequence[str], column: Sequence[str], sign: Sequence[str]) -> Dataset:
+    """A table of measurements as a recording.toml with these facts would read it."""
+    from bemt.data.readers.recording_toml import RecordingToml, joined
+    from bemt.data.recordings.cfd_options import recording_from
+
+    made = RecordingToml.model_validate(recording_from(file, unit, column, sign))
+    record = _finished(joined(made, Path(file).parent, file), Choice())
+    return replace(record, provenance={**record.provenance, "stated": file})
 
 
 def _study(run: RunToml, insist: bool) -> list[Dataset]:

@@ -222,8 +222,8 @@ class Imported:
         told = self.complaints
         return EXIT_INTERNAL if any(text.startswith(INTERNAL) for text in told) else EXIT_INPUT if told else EXIT_OK
 
-    def text(self, wrote: str = "") -> str:
-        """For a terminal, with what to do next with recordings of a rotor."""
+    def text(self, wrote: str = "", said: str = "") -> str:
+        """For a terminal, with what to do next with recordings of a rotor, of which `said` states the units."""
         own = {name for run in self.runs for name in run.files}
         shown = [f for f in self.files if f.format != RUN and f.error is None]
         lines = [f.title if f.path in own else f.text + "\n" for f in shown]
@@ -233,7 +233,7 @@ class Imported:
             lines.append(f"To use it as a CFD run, and --out run.toml to keep it:\n{steps}\n")
         if wrote or self.runs:
             return "\n".join([*lines, self._next_with_a_run(wrote)])
-        return "\n".join([*lines, *self._next_with_recordings()])
+        return "\n".join([*lines, *self._next_with_recordings(f" {said}" if said else "")])
 
     def _next_with_a_run(self, wrote: str) -> str:
         """What to do with a CFD run: in the file that was written, in one that was given, or in one to be written."""
@@ -244,7 +244,7 @@ class Imported:
         lead = f"{wrote} written. " if wrote else "" if file == name else f"With --out {file}: "
         return f"{lead}Next: bemt compare {shlex.quote(file)} --case CASE   (a case: bemt new 10x5)\n"
 
-    def _next_with_recordings(self) -> list[str]:
+    def _next_with_recordings(self, said: str) -> list[str]:
         """What to do with recordings of loads, if they have the speed."""
         read = [(f.path, f.record.kind, set(named(f.record).values)) for f in self.files if f.record]
         loaded = [shlex.quote(path) for path, _, channels in read if "rpm" in channels and _LOADS & channels]
@@ -252,5 +252,5 @@ class Imported:
             return ["Next: a column headed rpm, the speed of every row; no model can be set beside loads without it\n"]
         if not loaded:
             return []
-        step = f"Next: bemt diagnose {loaded[0]} --case CASE   (a case: bemt new 10x5)\n"
-        return [step + (f"      bemt compare {loaded[0]} {loaded[1]}\n" if len(loaded) == 2 else "")]
+        step = f"Next: bemt diagnose {loaded[0]} --case CASE{said}   (a case: bemt new 10x5)\n"
+        return [step + (f"      bemt compare {loaded[0]} {loaded[1]}{said}\n" if len(loaded) == 2 else "")]

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from bemt.base import unit_errors
 from bemt.base.arrays import Array
 from bemt.data.readers.samples import MOST_RPM_PER_V
-from bemt.data.recordings.findings import Facts, Finding, check_for
+from bemt.data.recordings.findings import MOTOR_EFFICIENCY, Facts, Finding, check_for
 from bemt.physics import k1k2 as empirical
 
 EXACT = 0.03
@@ -33,8 +33,8 @@ ALIKE = 4.0
 """Difference in score (chi-square) within which slips are told together."""
 
 ELECTRICAL, MISCOUNT = "rpm_electrical", "rpm_ratio"
-EFFICIENCY, SAME_DIGITS = (0.2, 0.95), 0.001
-"""Range of a motor's efficiency under load; scatter of a product that the file itself formed. [1]"""
+SAME_DIGITS = 0.001
+"""Scatter of a product that the file itself formed. [1]"""
 
 
 @dataclass(frozen=True)
@@ -286,7 +286,7 @@ def _electrical(facts: Facts, broken: list[Relation]) -> tuple[float, float, flo
     if ratio.size < 3 or (battery.size and abs(float(np.median(battery)) - 1.0) > 0.1):
         return None
     low, middle, high = (float(x) for x in np.percentile(ratio, [20.0, 50.0, 80.0]))
-    if not (EFFICIENCY[0] <= low and high <= EFFICIENCY[1]):
+    if not (MOTOR_EFFICIENCY[0] <= low and high <= MOTOR_EFFICIENCY[1]):
         return None
     digits = float(np.median(np.abs(ratio / middle - 1.0))) < SAME_DIGITS
     repairs = {"Q": 1.0 / middle, "n": 1.0 / middle, "P": middle}

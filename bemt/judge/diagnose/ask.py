@@ -7,11 +7,11 @@ import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemt.base.action import Told, as_html
+from bemt.base.action import Answered, Told
 from bemt.base.errors import Fault, InputError, refuse, system_fault
 from bemt.base.given import number, path_text
 from bemt.data.recordings.grid_study import together
@@ -32,13 +32,16 @@ from bemt.rotors.case import Case, case_of
 from bemt.rotors.case.words import sorted_out
 from bemt.rotors.propeller import Propeller, rotor_of
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 CHANNELS = {"thrust": "thrust_N", "torque": "torque_Nm", "speed": "rpm"}
 REPEATABILITY_MAX = 20.0
 """Beyond this runs do not repeat [%]."""
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class Answer(Answered):
     """Result of a diagnosis, returned by :func:`diagnose`.
 
     Parameters
@@ -86,10 +89,6 @@ class Answer:
         """Say the verdict in a line."""
         return f"<answer on {self.propeller.name}: {' '.join((self.verdict, ', '.join(self.effects))).strip()}>"
 
-    def _repr_html_(self) -> str:
-        """Show the answer in a notebook."""
-        return as_html(f"{self.propeller.name}: {' '.join((self.verdict, ', '.join(self.effects)))}", self.text)
-
     @property
     def verdict(self) -> str:
         """One of none, named, class, sensor, unknown, insufficient."""
@@ -99,6 +98,12 @@ class Answer:
     def effects(self) -> tuple[str, ...]:
         """Effects of the verdict; for a class, all members."""
         return self.diagnosis.said.effects
+
+    @property
+    def probability(self) -> float | None:
+        """How sure the verdict is, as the first line says it; None where nothing was weighed. [1]"""
+        found: float | None = self.document["probability"]
+        return found
 
     @property
     def text(self) -> str:
@@ -118,14 +123,14 @@ class Answer:
         text = improved_case(self.diagnosis, self.propeller.case, self.propeller.text)
         return Propeller(case_of(text, self.propeller.case.folder), text) if text else None
 
-    def to_dict(self) -> dict[str, Any]:
-        """Convert the answer to plain values.
+    def to_pandas(self) -> pd.DataFrame:
+        """The ranking: a row for each explanation that was weighed, the likeliest first."""
+        import pandas as pd
 
-        Returns
-        -------
-        dict
-            Schema ``bemt.diagnosis/1``.
-        """
+        return pd.DataFrame(self.document["ranking"])
+
+    def _document(self) -> dict[str, Any]:
+        """Schema ``bemt.diagnosis/1``."""
         return self.document
 
     def plot(self, folder: str | os.PathLike[str]) -> list[Path]:
@@ -190,6 +195,7 @@ def diagnosed(
     rest = _options({
         "--case": _quoted(given, "CASE"), "--off": off, "--only": only,
         "--reference-case": _quoted(several(reference_case), "CASE"), "--repeatability-pct": several(repeatability_pct),
+        **{f"--{name}": run[name] for name in ("unit", "column", "sign", "zones")},
         "--top-rpm": several(top_rpm), "--baseline": [baseline] * (baseline != "bemt"),
     })  # fmt: skip
     asked = Given(_quoted(files, "RECORDING"), _quoted(known, "REFERENCE"), rest, tuple(ruled_out), tuple(changed))
@@ -216,7 +222,7 @@ def _one_point(
     stated: Sequence[Any], case: Case, called: str, got: str, progress: Callable[[str], None] | None
 ) -> OnePoint:  # fmt: skip
     """One point, or grids of one condition, cannot be diagnosed: it is shown beside the model."""
-    seen = stated[0] if len(stated) == 1 else together([import_file(f) for f in stated])
+    seen = stated[0] if len(stated) == 1 else together([import_file(f) if isinstance(f, str) else f for f in stated])
     found = one_run.compare_run(seen, case, progress, called)
     words = f"Too few readings for a diagnosis ({got}).\n{one_run.text(found)}"
     return OnePoint({**found.document(), "verdict": "insufficient", "effects": []}, words)

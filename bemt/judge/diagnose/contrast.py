@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bemt.base.action import Told, as_html
+from bemt.base.action import Answered, Told
 from bemt.base.document import rows_of
 from bemt.base.errors import Fault, InputError, gathered, refuse
 from bemt.judge.compare.change_document import (
@@ -46,7 +46,7 @@ __all__ = ["Contrast", "compare", "label_diameter"]
 
 
 @dataclass(frozen=True, eq=False)
-class Contrast:
+class Contrast(Answered):
     """What changed between two recordings.
 
     Attributes
@@ -85,8 +85,7 @@ class Contrast:
         """The answer with its ranking, sub-systems and all notes."""
         return text(self.said, details=True)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values of schema ``bemt.comparison/1``."""
+    def _document(self) -> dict[str, Any]:
         return self.document
 
     def picture(self) -> bytes:
@@ -94,14 +93,6 @@ class Contrast:
         from bemt.judge.compare.first_picture import picture
 
         return picture(self.change, self.said)
-
-    def __str__(self) -> str:
-        """The answer on one screen."""
-        return self.text
-
-    def _repr_html_(self) -> str:
-        """Show the answer in a notebook."""
-        return as_html(repr(self)[1:-1], self.text)
 
     def __repr__(self) -> str:
         """Say the verdict in a line."""
@@ -121,6 +112,7 @@ def compare(
     air_a: str | None = None,
     air_b: str | None = None,
     progress: Callable[[str], None] | None = None,
+    run: Mapping[str, Any] | None = None,
 ) -> Contrast:
     """Say what changed between two recordings of one stand: paths, Datasets or DataFrames.
 
@@ -132,9 +124,9 @@ def compare(
     Loads are compared as load / (rho n^2) on a smooth curve over ln n and V/(n D), by Gaussian processes (Rasmussen and
     Williams 2006, eq. 2.23 to 2.24 and 2.37 to 2.42). Density counts where both recordings tell it.
     """
-    from bemt.data.recordings.load import import_file
+    from bemt.data.recordings.load import as_stated, import_file
     from bemt.judge.diagnose.load import is_table
-    from bemt.physics.dataset import from_pandas
+    from bemt.physics.dataset import Dataset, from_pandas
 
     names = ["A" if is_table(a) else os.fspath(a), "B" if is_table(b) else os.fspath(b)]
     asked = Invocation(
@@ -158,8 +150,10 @@ def compare(
         (a, b), names, conditions, (air_a, air_b), ("--air-a", "--air-b"), strict=True
     ):
         with gathered(faults):
-            made = from_pandas(given, name=name) if hasattr(given, "columns") else given
-            whole = made if is_table(given) else import_file(name)
+            told = name if not is_table(given) else given
+            told = as_stated([told], {k: v for k, v in (run or {}).items() if k != "rpm"})[0]
+            made = from_pandas(told, name=name) if hasattr(told, "columns") else told
+            whole = made if isinstance(made, Dataset) else import_file(name)
             read.append(with_air(selected(whole, rows, name), air, option))
     refuse(faults)
     D = case.diameter_m if case is not None and diameter_m is None else diameter_m
@@ -197,7 +191,7 @@ def compared(
     from bemt.judge.diagnose.load import is_table
 
     two = partial(compare, a, b, case, label=label, diameter_m=diameter_m, rows_a=rows_a, rows_b=rows_b, air_a=air_a,
-                  air_b=air_b, progress=progress)  # fmt: skip
+                  air_b=air_b, progress=progress, run=run)  # fmt: skip
     found: Contrast | Told
     if b is None:
         if case is None:

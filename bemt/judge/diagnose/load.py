@@ -74,6 +74,7 @@ def load(
 
     if imported is None:
         imported = run_at(path, rpm, airspeed_m_s) or import_file(path)
+    if not is_run(imported):
         _one_setup(imported, path)
         one_rotor(imported, path, "`compare A B --rows-b rotor={} --case CASE` takes one of them")
     if is_run(imported):
@@ -304,6 +305,8 @@ def _read(given: Any, case: Case, run: Dataset | None, rpm: float | None, airspe
         return load(given, case, run, rpm, airspeed_m_s)
     if isinstance(given, Dataset) and given.format == "cfd_run":
         return load(given.name, case, given)
+    if isinstance(given, Dataset) and "stated" in given.provenance:
+        return load(given.provenance["stated"], case, given, rpm, airspeed_m_s)
     return records.from_series(given if isinstance(given, Dataset) else from_pandas(given), case)
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bemt.base.action import Answered
 from bemt.base.arrays import Array
 from bemt.base.gaussian.evidence import log_sum
 from bemt.base.gaussian.whitening import whitener
@@ -37,7 +38,7 @@ DETECTABLE = {"visible": "yes", "marginal": "maybe", "invisible": "no"}
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class Plan(Answered):
     """What a plan can do."""
 
     confusion: form.Confusion  # Distances
@@ -73,8 +74,10 @@ class Plan:
     def text(self) -> str:
         """Tables for a terminal."""
         c = self.confusion
-        rows = []
+        rows, unseen = [], [i for i in c.ids if self.detectable[i] == "no"]
         for a in np.argsort(-self.size):
+            if c.ids[a] in unseen:
+                continue
             near = [(c.distance[a, b], c.ids[b]) for b in range(len(c.ids)) if b != a and c.size[b] >= form.ALIKE]
             nearest = min(near, default=(float("nan"), "-"))
             rows.append([c.ids[a], effects.catalogue()[c.ids[a]].title, f"{self.size[a]:.1f}",
@@ -87,11 +90,22 @@ class Plan:
             out.append(f"  cannot be distinguished: {', '.join(group)}")
         if self.added is not None:
             out.append(f"  to add: {self.added.text}{self.added.tells}")
-        out += [f"  not visible: {i}: {why}" for i, why in self.absent.items()]
+        if unseen or self.absent:
+            gone = f"{len(unseen)} too small for these points" if unseen else ""
+            cannot = f"{len(self.absent)} that they cannot hold" if self.absent else ""
+            out.append(f"  not visible: {' and '.join(filter(None, (gone, cannot)))}; --details lists them")
         return "\n".join([*out, *(f"  note: {note}" for note in self.notes)])
 
-    def to_dict(self) -> Mapping[str, object]:
-        """Plain values of schema ``bemt.plan/1``."""
+    @property
+    def details(self) -> str:
+        """The same, with every effect that these points do not show, and why."""
+        unseen = [f"{i}: size {s:.1f}, too small" for i, s in zip(self.confusion.ids, self.size, strict=True)
+                  if self.detectable[i] == "no"]  # fmt: skip
+        return "\n".join([self.text, *(f"  not visible: {one}" for one in
+                          (*unseen, *(f"{i}: {why}" for i, why in self.absent.items())))])  # fmt: skip
+
+    def _document(self) -> Mapping[str, object]:
+        """Schema ``bemt.plan/1``."""
         return document(self)
 
 

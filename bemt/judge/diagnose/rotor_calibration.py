@@ -15,10 +15,10 @@ import numpy as np
 import tomlkit
 
 from bemt import __version__
-from bemt.base.action import in_words_of_the_library
+from bemt.base.action import Answered, in_words_of_the_library
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
 from bemt.base.given import path_text
-from bemt.base.tables import json_text, number_text, plain, write_atomic
+from bemt.base.tables import json_text, number_text, write_atomic
 from bemt.judge.diagnose.folder import beside, elsewhere, name_after
 from bemt.judge.diagnose.load import cases_of, load
 from bemt.physics.air import Air
@@ -162,7 +162,7 @@ def lines_of(case: Case, one: AsMeasured, paths: Sequence[str], advice: bool = T
 
 
 @dataclass(frozen=True, eq=False)
-class CalibratedRotor:
+class CalibratedRotor(Answered):
     """A rotor as its own runs show it, returned by :func:`bemt.calibrate_rotor`.
 
     Parameters
@@ -210,7 +210,7 @@ class CalibratedRotor:
         lines += [f"      bemt drive {typed}"] if self.source.case.file.drive is not None else []
         return "\n".join(lines)
 
-    def to_dict(self) -> Mapping[str, object]:
+    def _document(self) -> Mapping[str, object]:
         """Plain values of schema ``bemt.rotor_calibration/1``."""
         case, one = self.source.case, self.found
         numbers = {
@@ -219,15 +219,14 @@ class CalibratedRotor:
             for k, name in enumerate(NAMES)
         }  # fmt: skip
         airspeed = flight_point(case, one)
-        out: Mapping[str, object] = plain({
+        return {
             "schema": SCHEMA, "case": case.name, "reference": [Path(p).name for p in self.recordings],
             "points": one.points, "converged": one.found.converged, "steps": one.found.steps,
             "log_evidence": one.found.log_evidence, "size": _size(one), "excess": one.found.excess,
             "known_from": one.prior.known_from, "numbers": numbers, "recommended_airspeed_m_s": airspeed,
             "rpm": case.rpm,
             "recommended_J": None if airspeed is None else airspeed / (case.rpm / 60.0 * case.diameter_m),
-        })  # fmt: skip
-        return out
+        }  # fmt: skip
 
     def write(self, folder: str | os.PathLike[str]) -> Propeller:
         """Write the case of the rotor as measured, and load it.

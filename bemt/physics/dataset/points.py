@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bemt.base.action import worded
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.tables import number_of
@@ -93,7 +94,8 @@ class Dataset:
     notes : tuple of str
         What was assumed, dropped or averaged.
     units : mapping of str to str
-        Unit of channels whose name does not end in a unit, as in the file; "": unknown.
+        Unit of channels whose name does not end in a unit, as in the file; "": unknown. :meth:`unit` knows that of
+        every channel.
     lines : range or tuple of int
         Line of each point in its file, from 1; empty: unknown.
     texts : mapping of str to tuple of str
@@ -391,13 +393,14 @@ class Dataset:
             u["eta"] = np.where(np.isfinite(u_eta), u_eta, np.nan)
         return replace(self, values=values, u=u)
 
+    @worded
     def select(self, where: ArrayLike | slice | Callable[[Dataset], ArrayLike]) -> Self:
         """Select points.
 
         Parameters
         ----------
         where : (N,) bool array, int array, slice, or function of the series that gives one
-            Points to keep, in this order.
+            Points to keep, in this order: ``d.select(d.rpm == 6000)``.
 
         Returns
         -------

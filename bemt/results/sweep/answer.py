@@ -7,8 +7,9 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from bemt.base.action import Answered
 from bemt.base.errors import EXIT_UNCONVERGED
 from bemt.base.tables import number_text, text_table
 from bemt.results.sweep import batch
@@ -16,6 +17,9 @@ from bemt.results.sweep.rows import ROW_SOURCES, Comparison, Result, State, Swee
 from bemt.results.sweep.store import case_text, overview_text
 from bemt.rotors.case import find_cases
 from bemt.rotors.validity import kind, serious
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 # One screen of a sweep: thrust beside what was recorded, what differs most and why, and where to read on.
 
@@ -91,7 +95,7 @@ def _percent(t: _Thrust) -> str:
 
 def _table(solved: Sequence[Result], found: Sequence[_Thrust]) -> list[str]:
     moving = any(r.airspeed_m_s for result in solved for r in result.of("bemt"))
-    header = ["thrust [N]", "rpm", *(["V"] if moving else []), "BEMT", "K1/K2", "recorded", "difference", "agree?"]
+    header = ["thrust [N]", "rpm", *(["V"] if moving else []), "BEMT", "W", "K1/K2", "recorded", "difference", "agree?"]
     kept = found[: max(ROWS - len(solved), 4)]
     body = [row for result in solved for row in _rows(result, [t for t in kept if t.case is result], moving)]
     shown = body[:ROWS]
@@ -117,7 +121,8 @@ def _rows(result: Result, found: Sequence[_Thrust], moving: bool) -> list[list[s
                 for t in found if (t.rpm, t.airspeed_m_s) == here]  # fmt: skip
         u = "" if not math.isfinite(row.u) else f" ± {number_text(row.u, 2)}"
         cells = [f"{row.rpm:.0f}", *([f"{row.airspeed_m_s:g}"] if moving else []),
-                 f"{number_text(row.thrust_N, 3)}{u}", number_text(formula.get(here), 3)]  # fmt: skip
+                 f"{number_text(row.thrust_N, 3)}{u}", number_text(row.power_W, 3),
+                 number_text(formula.get(here), 3)]  # fmt: skip
         for words in told or ([] if k else [["-", "", ""]]):
             body.append([_name(result.name) if not body else "", *cells, *words])
             cells = [""] * len(cells)
@@ -246,7 +251,7 @@ def _short(line: str, cut: bool) -> list[str]:
 
 
 @dataclass(frozen=True, eq=False)
-class SweepAnswer:
+class SweepAnswer(Answered):
     """Cases that were solved and compared, returned by :func:`bemt.sweep`."""
 
     found: Sweep
@@ -277,12 +282,21 @@ class SweepAnswer:
         """Every case in full."""
         return "\n\n".join([*map(case_text, self.found.cases), overview_text(self.found.cases)])
 
-    def __str__(self) -> str:
-        return self.text
+    def __repr__(self) -> str:
+        """Say in a line how many cases were solved."""
+        solved = sum(bool(result.rows) for result in self.found.cases)
+        return f"<sweep of {len(self.found.cases)} cases, {solved} solved>"
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values of schema ``bemt.sweep/1``."""
+    def _document(self) -> dict[str, Any]:
+        """Schema ``bemt.sweep/1``."""
         return self.found.document()
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A row for each model and recorded value of each case; ``u``: standard uncertainty of the thrust. [N]"""
+        import pandas as pd
+
+        rows = [{"case": one.name} | row.document() for one in self.found.cases for row in one.rows]
+        return pd.DataFrame([row | {"flags": "; ".join(row["flags"])} for row in rows])
 
 
 def sweep(paths: Sequence[str], out: str | None, *, tolerance: float | None, **more: Any) -> SweepAnswer:

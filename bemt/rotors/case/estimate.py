@@ -18,6 +18,7 @@ from bemt.base.given import numbers
 from bemt.base.tables import number_text, or_null, speed_text, text_table
 from bemt.base.units import INCH, KGF
 from bemt.data.readers.uiuc_names import find_family
+from bemt.physics.bem.model import HUB_LOADS
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case import Case, case_of, fresh
 from bemt.rotors.case.load import with_changes
@@ -35,7 +36,8 @@ UNITS = {"mm": 1e-3, "in": INCH, "cm": 1e-2, "m": 1.0}
 POSSIBLE = {"pitch": (0.1, 2.5), "chord": (0.02, 0.4)}
 """Over the diameter; outside, a propeller is no propeller, mostly one unit has been taken for another. [1]"""
 DENSITY = (0.01, 10.0)
-WIDTH = 118
+SWAPPED = 1.5
+"""Pitch over the diameter from which on the two may stand in the wrong order: declared [1]."""
 
 
 def length_fault(option: str, value: float, unit: str, diameter_m: float, limits: tuple[float, float]) -> list[Fault]:
@@ -153,13 +155,14 @@ def _of_label(
         "u95_power_W": found.half_width95("power_W"), "u_reading_thrust_N": found.u_reading("thrust_N"),
         "u_reading_power_W": found.u_reading("power_W"), "J": points.J, "CT": points.CT, "CP": points.CP,
         "M_tip": points.M_tip, "Re75": points.Re75, "k1k2_thrust_N": simple.thrust_N,
-        "H_force_N": points.values.get("H_force_N", np.where(points.converged, 0.0, np.nan)),
+        "torque_Nm": points.torque_Nm, "u_torque_Nm": points.u["torque_Nm"],
+        **{key: points.values.get(key, np.where(points.converged, 0.0, np.nan)) for key in HUB_LOADS},
     }  # fmt: skip
     given = EstimateInput(
         label, told.diameter_in, told.pitch_in, told.blades, told.blade_class, chord_mm, measured_pitch_in,
         case.file.blade.family, float(case.air().rho), reading, case.as_built().prior.known_from, measured_source(case),
     )  # fmt: skip
-    u = {"thrust_N": columns["u_thrust_N"], "power_W": columns["u_power_W"]}
+    u = {key: columns[f"u_{key}"] for key in ("thrust_N", "torque_Nm", "power_W")}
     values = {k: v for k, v in columns.items() if k.startswith("u_reading") or not k.startswith(("u_", "u95_"))}
     if (sideslip := np.radians(values.pop("angle_deg"))).any():
         values["sideslip_rad"] = sideslip
@@ -233,6 +236,8 @@ class RotorEstimate(Dataset):
         notes = ["± 68 and 95 %: the rotor itself; on a stand: what yours may show, ± 68 %"]
         if g.source:
             notes.append(f"as measured: {g.source}")
+        if g.pitch_in > SWAPPED * g.diameter_in:
+            notes.append(f"! a label is diameter x pitch: is it {g.pitch_in:g}x{g.diameter_in:g}?")
         notes += [f"! {flag}" for flag in counted([list(flags) for flags in self.flags])]
         more = ["--chord-mm (at 0.75 R)"] if g.chord_mm is None else []
         if g.reading is None:

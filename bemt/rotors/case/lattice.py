@@ -7,6 +7,7 @@ speed. The lattice does not depend on the points, so that neither does a point's
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError, gathered, refuse
+from bemt.base.errors import Fault, InputError, RangeWarning, gathered, refuse
 from bemt.base.given import numbers
 from bemt.base.tables import number_of
 from bemt.rotors.case.load import Case
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 
 # Operating points that a caller asks of a case, checked.
 
+FAST = 150.0
+"""Airspeed from which on a unit is asked about: declared [m/s]."""
 RPM_MAX, AIRSPEED_MAX = 300000.0, 300.0  # as in a case file [rev/min], [m/s]
 
 
@@ -52,13 +55,16 @@ def conditions(case: Case, rpm: Any, airspeed_m_s: Any, J: Any) -> tuple[Array, 
     except ValueError:
         got = ", ".join(f"{value.size} of {name}" for name, value in found.items())
         faults.append(Fault("", ", ".join(shapes), got, "as many of each, or one", "curve() takes every pair"))
-        refuse(faults)
+        raise InputError(faults) from None
     V = found.get("airspeed_m_s", np.asarray(case.airspeed_m_s, dtype=float))
     if "J" in found:
         V = found["J"] * n / 60.0 * case.diameter_m
     if (fast := np.max(np.abs(V))) > AIRSPEED_MAX:
         name, hint = ("J", "V = J n D") if "J" in found else ("airspeed_m_s", "km/h? Divide by 3.6")
         faults.append(Fault("", name, f"{fast:g} m/s", f"up to {AIRSPEED_MAX:g} m/s", hint))
+    elif "airspeed_m_s" in found and fast > FAST:
+        told = f"airspeed_m_s: {fast:g} m/s is faster than propellers fly. In km/h? Divide by 3.6"
+        warnings.warn(told, RangeWarning, stacklevel=5)
     refuse(faults)
     n, V = np.broadcast_arrays(n, V)
     return np.atleast_1d(n).astype(float).ravel(), np.atleast_1d(V).astype(float).ravel()

@@ -50,9 +50,10 @@ def choose(
     blades : int or sequence of int
         Blades of the standard sizes.
     mass_kg : float, optional
-        Mass of the vehicle: power, current and time are of hover. [kg]
+        Mass of the vehicle with the first pair on it: power, current and time are of hover. [kg]
     rest_kg : float, optional
-        Of that mass, what is not motor, propeller, controller and frame; 60 % of it by default. [kg]
+        Of that mass, what is not motor, propeller, controller and frame; what the first pair leaves by default. Every
+        pair lifts it and its own parts. [kg]
     rotors : int
         Rotors that carry the vehicle and share the battery; both of a coaxial pair count.
     airspeed_m_s : float

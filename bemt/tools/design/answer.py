@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bemt.base import canvas
-from bemt.base.action import as_html
+from bemt.base.action import Answered
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
 from bemt.base.tables import csv_text, json_text, number_of, number_text, text_table, write_atomic
 from bemt.rotors.case.motor import LIST, motors_on_sale
-from bemt.tools.design.search import Target
+from bemt.tools.design.search import SOC_END, Target
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,7 +23,7 @@ SHOWN = 10
 
 
 @dataclass(frozen=True, eq=False)
-class DriveChoice:
+class DriveChoice(Answered):
     """Propellers and motors for a target, best first; columns of the table are attributes as well.
 
     Parameters
@@ -51,15 +51,9 @@ class DriveChoice:
     def __len__(self) -> int:
         return len(self.table)
 
-    def __str__(self) -> str:
-        return self.text
-
     def __repr__(self) -> str:
         first = self.table.iloc[0]
         return f"<choice of {len(self.table)} pairs: {first.label} with {first.kv:.0f} rev/min/V>"
-
-    def _repr_html_(self) -> str:
-        return as_html(repr(self)[1:-1], self.text)
 
     @property
     def good(self) -> pd.DataFrame:
@@ -71,8 +65,12 @@ class DriveChoice:
         """1 if no pair is sure to meet the target."""
         return EXIT_OK if len(self.good) else EXIT_UNCONVERGED
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values, ``bemt.choose/1``; all pairs, best first."""
+    def to_pandas(self) -> pd.DataFrame:
+        """The table, a row per pair."""
+        return self.table.copy()
+
+    def _document(self) -> dict[str, Any]:
+        """``bemt.choose/1``; all pairs, best first."""
         pairs, on_sale = (table.to_dict("records") for table in (self.table, self.on_sale))
         return {"schema": SCHEMA, "target": vars(self.target), "sure": self.sure, "pairs": pairs, "on_sale": on_sale}
 
@@ -80,7 +78,7 @@ class DriveChoice:
     def text(self) -> str:
         """One screen: what to take, and the best motor of each label."""
         t, good = self.target, len(self.good)
-        at = "hover" if t.cruise_N is not None else "this thrust"
+        at = "this thrust" if t.cruise_N is None else f"hover of {self.table.mass_kg.iloc[0]:.3g} kg"
         size = "" if t.airspeed_m_s == 0.0 else f" at {t.airspeed_m_s:g} m/s"
         fluid = "" if t.fluid == "air" else ", in water"
         pair = ", each one of a coaxial pair" if t.coaxial else ""
@@ -93,25 +91,30 @@ class DriveChoice:
             "",
             f"{what}{pair} on {t.cells}S at 50% charge{size}{fluid}, tip Mach up to {t.max_tip_mach:g}: "
             f"{good} of {len(self.table)} pairs meet it with a probability of {self.sure:.0%} or more",
-            f"power, current and time at {at} of one rotor; ± one standard deviation; best motor of each label",
+            f"power, current and time at {at.partition(' of ')[0]} of one rotor; ± one standard deviation; best motor "
+            "of each label",
             "peak A and full N: at full throttle, what the controller has to stand and what is reached",
         ]
         if t.rest_kg is not None:
+            what = "" if t.told_rest else f"the first weighs {self.table.mass_kg.iloc[0]:.3g} kg in all, and "
             lines.append(
-                f"hover lifts {t.rest_kg:.3g} kg and, of each rotor, motor, propeller, controller and frame (column g, "
-                "by laws with a spread of 25 to 50 %)"
+                f"{what}every pair lifts the same {t.rest_kg:.3g} kg and its own motors, propellers, controllers and "
+                "frame (column g, of one rotor, by laws with a spread of 25 to 50 %): column kg is what hovers"
             )
         if t.max_diameter_in is None:
             lines.append("no limit on the diameter: give --max-diameter-in, or --arm-mm of the frame")
+        if t.capacity_Ah is not None:
+            lines.append(f"min: {1.0 - SOC_END:.0%} of the battery is flown, {SOC_END:.0%} stays in it")
         timed = "min" if t.capacity_Ah is not None else "min/Ah"
         head = [
             "propeller", "kv", "P(met)", "power W", "A", "peak A", "g/W", timed, "Mach", "full N", "g",
-            "why not the first",
+            *([] if t.rest_kg is None else ["kg"]), "why not the first",
         ]  # fmt: skip
         rows = [
             [r.label, f"{r.kv:.0f}", f"{r.probability:.0%}", _banded(r.power_W, r.u_power_W),
              *(number_text(v, 3) for v in (r.current_A, r.peak_A, r.g_per_W, r.minutes)), number_text(r.tip_mach, 2),
-             number_text(r.full_thrust_N, 3), f"{r.propulsion_g:.0f}", r.why or "-"]
+             number_text(r.full_thrust_N, 3), f"{r.propulsion_g:.0f}",
+             *([] if t.rest_kg is None else [number_text(r.mass_kg, 3)]), r.why or "-"]
             for r in best_of_each(self.table).head(SHOWN).itertuples()
         ]  # fmt: skip
         return "\n".join([*lines, "", text_table(head, rows, range(len(head))), *self._stock()]) + "\n"
@@ -160,9 +163,12 @@ class DriveChoice:
         source = f"{known:,} of {LIST} (Karakaya, Apache-2.0), makers' numbers; price and stock not known"
         if self.on_sale.empty:
             return ["", f"No motor on sale near that K_v and mass is sure to turn {first.label}: none of {source}"]
-        head = ["motor on sale", "kv", "g", "P(met)", "power W", "peak A", "of A", "full N"]
+        weighed = t.rest_kg is not None
+        head = ["motor on sale", "kv", "g", *(["kg"] if weighed else []), "P(met)", "power W", "peak A", "of A",
+                "full N"]  # fmt: skip
         rows = [
-            [r.motor, f"{r.kv:.0f}", f"{r.motor_g:.0f}", f"{r.probability:.0%}", _banded(r.power_W, r.u_power_W),
+            [r.motor, f"{r.kv:.0f}", f"{r.motor_g:.0f}", *([number_text(r.mass_kg, 3)] if weighed else []),
+             f"{r.probability:.0%}", _banded(r.power_W, r.u_power_W),
              *(number_text(v, 3) for v in (r.peak_A, r.max_current_A, r.full_thrust_N))]
             for r in self.on_sale.itertuples()
         ]  # fmt: skip

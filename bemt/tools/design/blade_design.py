@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemt.base import cache
+from bemt.base.action import Answered
 from bemt.base.arrays import Array
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError, gathered, refuse
 from bemt.base.units import INCH
@@ -68,7 +69,7 @@ class OverRotors:
 
 
 @dataclass(frozen=True, eq=False)
-class Design:
+class Design(Answered):
     """A blade that was designed.
 
     Attributes
@@ -153,8 +154,8 @@ class Design:
         """1 if the search did not converge."""
         return EXIT_OK if self.found.converged else EXIT_UNCONVERGED
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values, ``bemt.design/1``."""
+    def _document(self) -> dict[str, Any]:
+        """``bemt.design/1``."""
         from bemt.tools.design.design_answer import document
 
         return document(self)

@@ -43,8 +43,8 @@ SPREAD = {"motor": 0.25, "propeller": 0.33, "esc": 0.3, "arm": 0.5}
 CLEARANCE = 1.05
 """Distance of neighbouring shafts over the diameter, at least: declared [1]."""
 SHARE = 0.4
-"""Share of a vehicle's mass that motors, propellers, controllers and frame have: declared, 35 to 45 % of multirotors
-by the laws above [1]."""
+"""Share of a vehicle's mass with which the search for what is left of it begins: declared, 35 to 45 % of multirotors by
+the laws above [1]."""
 
 
 @dataclass(frozen=True)

@@ -73,6 +73,12 @@ together more than the draws say; with 0.7, 79 % lie within one and 96 % within 
 NEAR = 0.05
 """The smallest within this share of the least power comes first: the optimum is flat, and no label is known better."""
 DRAWS = 256
+PILOT = 32
+"""Draws of the ranking that only finds which pair the mass is stated for."""
+AGAIN = 0.002
+"""Of the mass: a first pair that is further from it is not that of the pilot [1]."""
+SETTLED = 1e-4
+"""Change of the speed at full throttle from which on it is solved [rev/min]."""
 LATTICE = 235
 """Of the odd generators the one with the least centred discrepancy in six dimensions: 5.8e-4, Sobol's points 5.5e-4.
 The seventh coordinate, of the masses, hardly moves any result."""
@@ -91,9 +97,11 @@ class Target:
     # Battery capacity [A h]; time at `cruise_N` that is part of the target [min]
     capacity_Ah: float | None = None
     minutes: float | None = None
-    # Mass of the vehicle, and of it without motors, propellers, controllers and arms [kg]
+    # Mass of the vehicle, and of it without motors, propellers, controllers and arms [kg]. Every pair lifts the same
+    # rest and its own parts. A rest that was not told is what the first pair leaves of the mass: it hovers the mass.
     mass_kg: float | None = None
     rest_kg: float | None = None
+    told_rest: bool = False
     fixed: bool = True  # Whether the thrust is asked for, not twice that of hover
     fluid: str = "air"
     coaxial: bool = False
@@ -132,7 +140,8 @@ def choose(
     """Rank propellers and motors; arguments as those of :func:`bemt.choose`.
 
     A row per pair, best first; ``propulsion_g`` is the mass of one rotor's motor, propeller, controller and arm,
-    ``at_N`` the thrust of the power, ``reached`` the probability of thrust and tip Mach number without the time,
+    ``at_N`` the thrust of the power, ``mass_kg`` what the vehicle weighs with the pair, ``reached`` the probability of
+    thrust and tip Mach number without the time,
     ``why`` says why it is not the first. Pairs that meet the target with the
     probability `sure` come first: the smallest within 5 % of the least power, the one with the least power, then by
     power. Beside it the target as it was tried, and likewise up to three motors on sale for the first propeller.
@@ -153,10 +162,42 @@ def choose(
     if not loads:
         raise InputError(Fault("", "--labels", "none that can be solved", "a propeller that can reach the speed"))
     spreads = rotor_loads.scatters(loads, target.thrust_N, target.airspeed_m_s, target.fluid, target.coaxial)
-    rows = [row for one in loads for row in _rows(one, rotor_loads.nearest(one, spreads), machines, target)]
-    table = _ranked(pd.DataFrame(rows), sure)
+    near = [rotor_loads.nearest(one, spreads) for one in loads]
+
+    def ranked(lifting: Target, draws: int = DRAWS) -> pd.DataFrame:
+        found = (_rows(one, u, machines, lifting, draws) for one, u in zip(loads, near, strict=True))
+        return _ranked(pd.DataFrame([row for rows in found for row in rows]), sure)
+
+    if target.mass_kg is not None and not target.told_rest:
+        target = _lifting(target, ranked(target, PILOT), loads, machines)
+    table = ranked(target)
+    if target.mass_kg is not None and not target.told_rest:
+        other = _lifting(target, table, loads, machines)
+        if abs((other.rest_kg or 0.0) - (target.rest_kg or 0.0)) > AGAIN * target.mass_kg:  # the pilot had another
+            target = other
+            table = ranked(target)
     table["why"] = _reasons(table, target, sure)
     return table, target, pd.DataFrame(_on_sale(table, loads, spreads, target, sure))
+
+
+def _lifting(
+    target: Target, table: pd.DataFrame, loads: Sequence[RotorLoads], machines: Sequence[KnownMotor]
+) -> Target:
+    """Target with the rest that the first pair of a table leaves of the mass, its own parts being sized for that."""
+    mass, first = target.mass_kg or 0.0, table.iloc[0]
+    one = next(x for x in loads if x.label == first.label)
+    motor = next(m for m in machines if m.name == first.motor)
+    at = mass * G0 / target.rotors
+    asked = target.thrust_N if target.fixed else 2.0 * at
+    _, own_kg = _own(one, target, asked, motor.mass_g if len(machines) == 1 or not target.sized else math.nan)
+    return dataclasses.replace(target, rest_kg=max(mass - target.rotors * own_kg, 0.0))
+
+
+def _own(loads: RotorLoads, target: Target, asked_N: float, motor_g: float) -> tuple[motors_file.Masses, float]:
+    """Parts of one rotor for a thrust at full throttle, and their mass [kg]: two of a pair share an arm."""
+    n = float(np.nan_to_num(loads.speed_for(np.array([asked_N]))[0], nan=loads.rpm[-1]))
+    parts = _parts(loads, target, n, asked_N, motor_g)
+    return parts, float(parts.total - (0.5 * parts.arm if target.coaxial else 0.0))
 
 
 MAKERS = 3
@@ -256,13 +297,13 @@ def target_of(
     if mass_kg is not None:
         hover = mass_kg * G0 / rotors
         most = 2.0 * hover if thrust_N is None else thrust_N
-        rest = (1.0 - motors_file.SHARE) * mass_kg if rest_kg is None else rest_kg
+        rest = (1.0 - motors_file.SHARE) * mass_kg if rest_kg is None else rest_kg  # to start with
         if most < hover:
             hint = f"Each of {rotors} carries {hover:.2f} N in hover"
             raise InputError(Fault("", "--thrust-N", f"{most:g}", f"{hover:.4g} N or more", hint))
     arm_m = None if arm_mm is None else 1e-3 * arm_mm
     return Target(most, int(cells or 1), hover, airspeed_m_s, max_tip_mach, rotors, capacity_Ah, minutes, mass_kg, rest,
-                  thrust_N is not None, fluid, coaxial, fan, True, arm_m)  # fmt: skip
+                  rest_kg is not None, thrust_N is not None, fluid, coaxial, fan, True, arm_m)  # fmt: skip
 
 
 def _check(kv: Sequence[float], max_diameter_in: float | None, sure: float, blades: Sequence[int]) -> None:
@@ -369,9 +410,11 @@ def _driven(amps: Array) -> Array:
     return np.where(amps > 0.0, amps, math.nan)
 
 
-def _chain(loads: RotorLoads, machines: Sequence[KnownMotor], target: Target, motor_kg: float | None) -> _Chain:
+def _chain(
+    loads: RotorLoads, machines: Sequence[KnownMotor], target: Target, motor_kg: float | None, draws: int = DRAWS
+) -> _Chain:
     share = {
-        name: np.interp(u, [0.0, 0.5, 1.0], [item.low, item.value, item.high])
+        name: np.interp(u[: draws + 1], [0.0, 0.5, 1.0], [item.low, item.value, item.high])
         for (name, item), u in zip(SHARES.items(), _draws()[1], strict=True)
     }
     sag, idle, lost = share["sag"], share["idle_share"], share["drop"]
@@ -385,29 +428,31 @@ def _chain(loads: RotorLoads, machines: Sequence[KnownMotor], target: Target, mo
     full = np.minimum((0.9 - lost) * loaded / k * 30.0 / math.pi, loads.rpm[-1])
     amps = loads.torque_at(full) / k / (1.0 - idle)
     for _ in range(80):
-        new = np.maximum(((1.0 - lost) * loaded - ohm * amps) / k * 30.0 / math.pi, 1.0)
+        old, new = full, np.maximum(((1.0 - lost) * loaded - ohm * amps) / k * 30.0 / math.pi, 1.0)
         full = 0.7 * full + 0.3 * np.minimum(new, loads.rpm[-1])
         amps = loads.torque_at(full) / k / (1.0 - idle)
+        if np.nanmax(np.abs(full - old)) < SETTLED:
+            break
     winding = lost * loaded / _driven(amps) + ohm
     amps = _driven(amps)
     rest = np.where(np.isnan(no_load), idle * amps, no_load)
     return _Chain(k, winding, rest, sag * target.voc / amps, target.voc)
 
 
-def _rows(loads: RotorLoads, u: LoadScatter, machines: Sequence[KnownMotor], target: Target) -> list[dict[str, Any]]:
-    z = _draws()[0]
+def _rows(
+    loads: RotorLoads, u: LoadScatter, machines: Sequence[KnownMotor], target: Target, draws: int = DRAWS
+) -> list[dict[str, Any]]:  # fmt: skip
+    z = _draws()[0][:, : draws + 1]
     thrust = np.exp(u.u_thrust * z[0])
     torque = np.exp(u.u_torque * (u.correlation * z[0] + math.sqrt(1.0 - u.correlation**2) * z[1]))
     at, asked = np.full((1, 1), target.at_N), np.full((1, 1), target.thrust_N)
-    for _ in range(4 if target.rest_kg else 1):  # a heavier motor lifts itself as well
-        n = float(np.nan_to_num(loads.speed_for(asked[0, :1])[0], nan=loads.rpm[-1]))
-        parts = _parts(loads, target, n, float(asked[0, 0]), machines[0].mass_g if len(machines) == 1 else math.nan)
-        own_kg = float(parts.total - (0.5 * parts.arm if target.coaxial else 0.0))  # two rotors on one arm
-        if target.rest_kg:
-            heavier = np.exp(min(float(parts.u) / own_kg, 1.0) * z[2])
+    for _ in range(1 if target.rest_kg is None else 8):  # a heavier motor lifts itself as well
+        parts, own_kg = _own(loads, target, float(asked[0, 0]), machines[0].mass_g if len(machines) == 1 else math.nan)
+        if target.rest_kg is not None:
+            heavier = np.exp(min(float(parts.u) / own_kg, 1.0) * z[2]) if target.told_rest else np.ones(draws + 1)
             at = G0 * (target.rest_kg / target.rotors + own_kg * heavier)[None, :]
             asked = asked if target.fixed else 2.0 * at
-    chain = _chain(loads, machines, target, float(parts.motor) if target.sized else None)
+    chain = _chain(loads, machines, target, float(parts.motor) if target.sized else None, draws)
     own = _Chain(chain.k, chain.ohm[:, :1], chain.idle_A[:, :1], chain.battery_ohm[:, :1], chain.voc)
     duty, bus, _ = own.at(loads.rpm[None, :], loads.torque_Nm[None, :])
     reach = np.isfinite(duty)
@@ -437,6 +482,7 @@ def _rows(loads: RotorLoads, u: LoadScatter, machines: Sequence[KnownMotor], tar
          "rpm": float(n_at[i]),
          "tip_mach": float(mach[i, 0]), "full_thrust_N": float(most[i]), "propulsion_g": 1e3 * own_kg,
          "motor_g": 1e3 * float(parts.motor),
+         "mass_kg": math.nan if target.rest_kg is None else target.rotors * float(at[i]) / G0,
          "at_N": float(at[i]), "asked_N": float(asked[i]), "keller_N": loads.keller_N}
         for i, m in enumerate(machines)
     ]  # fmt: skip
@@ -447,7 +493,8 @@ def _parts(loads: RotorLoads, target: Target, rpm: float, thrust_N: float, motor
     torque = float(loads.torque_at(np.array([rpm]))[0])
     arm = motors_file.arm_for(loads.diameter_m, target.arms) if target.arm_m is None else target.arm_m
     watts = torque * rpm * math.pi / 30.0 / EFFICIENCY
-    parts = motors_file.masses(torque, watts, thrust_N, loads.diameter_m, loads.blades, arm if target.rest_kg else 0.0)
+    carried = 0.0 if target.rest_kg is None else arm
+    parts = motors_file.masses(torque, watts, thrust_N, loads.diameter_m, loads.blades, carried)
     return parts if math.isnan(motor_g) else dataclasses.replace(parts, motor=np.asarray(1e-3 * motor_g))
 
 

@@ -10,14 +10,14 @@ import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemt.base.action import as_html
+from bemt.base.action import Answered
 from bemt.base.arrays import Array
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError, refuse
-from bemt.base.tables import csv_text, json_text, number_text, plain, write_atomic
+from bemt.base.tables import csv_text, json_text, number_text, write_atomic
 from bemt.base.units import G0, INCH, KGF
 from bemt.rotors.case import Case
 from bemt.rotors.case.load import with_changes
@@ -26,6 +26,9 @@ from bemt.rotors.case.propagate import propagate, vary
 from bemt.rotors.case.schema import AIRSPEED
 from bemt.tools.drive import drive_model, mission, outputs
 from bemt.tools.drive.drive_model import EFFECTS, Drive, RotorMap, Steady
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SCHEMA = "bemt.drive.result/2"
 COLUMNS = ("pulse_us", "rpm", "thrust_N", "battery_A", "voltage_V", "power_W", "efficiency")
@@ -57,7 +60,7 @@ class DriveBand:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class DriveResult:
+class DriveResult(Answered):
     """A rotor with its motor and battery; NaN where the drive does not get there.
 
     Parameters
@@ -105,10 +108,6 @@ class DriveResult:
         t = drive_model.drive_table(self.case)
         return f"<drive of {self.case.name}: {t.kv:g} rev/min/V, {t.cells}S, {shown(self.full['thrust_N'], 'N')}>"
 
-    def _repr_html_(self) -> str:
-        """Show the result in a notebook."""
-        return as_html(repr(self)[1:-1], self.text)
-
     @property
     def exit_code(self) -> int:
         """1 if hover or airspeed is beyond the drive, or a point is unconverged."""
@@ -125,8 +124,23 @@ class DriveResult:
         settled = bool(np.all(self.steady.converged)) and self.course is not None and bool(self.course.converged)
         return settled and math.isfinite(self.hover["power_W"].value)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values, ``bemt.drive.result/2``; thrust over power in gf/W."""
+    @property
+    def no_hover(self) -> str:
+        """Why there are no numbers of hover; empty where there are."""
+        if math.isfinite(self.hover["power_W"].value):
+            return ""
+        most = self.full["thrust_N"].value
+        gives = f"{most:.1f} N" if math.isfinite(most) else "an unknown maximum"
+        return f"each rotor needs {self.hover['thrust_N'].value:.1f} N and gives {gives}"
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Rows over the throttle, as drive.csv has them: SI units by name, ``u_`` the standard uncertainty."""
+        import pandas as pd
+
+        return pd.DataFrame(_rows(self))
+
+    def _document(self) -> dict[str, Any]:
+        """``bemt.drive.result/2``; thrust over power in gf/W."""
         t = drive_model.drive_table(self.case)
         motor, battery = self.drive.motor, self.drive.battery
         given = {"kv": t.kv, "cells": t.cells, "soc": t.soc, "airspeed_m_s": self.airspeed_m_s,
@@ -135,14 +149,12 @@ class DriveResult:
                  "battery_mohm": 1e3 * battery.resistance_ohm}  # fmt: skip
         parts = {name: {k: vars(b) for k, b in getattr(self, name).items()} for name in ("full", "hover")}
         steady = {f.name: getattr(self.steady, f.name) for f in dataclasses.fields(Steady)}
-        made = {"schema": SCHEMA, "case": self.case.name, "given": given, "off": sorted(self.drive.off), **parts,
+        return {"schema": SCHEMA, "case": self.case.name, "given": given, "off": sorted(self.drive.off), **parts,
                 "steady": steady | {f"u_{k}": v for k, v in self.u.items()},
                 "full_thrust_settled_temperature_C": self.settled_C,
                 "response": [dataclasses.asdict(s) for s in self.response],
                 "unknowns": {item.key: f"{item.range_text} ({item.why})" for item in self.case.assumptions},
-                "notes": list(self.notes)}  # fmt: skip
-        found: dict[str, Any] = plain(made)
-        return found
+                "no_hover": self.no_hover or None, "notes": list(self.notes)}  # fmt: skip
 
 
 def with_drive(case: Case, motor: str | None = None, **given: float | None) -> Case:
@@ -353,12 +365,12 @@ def shown(band: DriveBand, unit: str, scale: float = 1.0) -> str:
 
 def _aloft(found: DriveResult) -> str:
     """Flight time, or why there is none."""
-    full, hover = found.full, found.hover
-    if math.isfinite(hover["power_W"].value):
-        known = drive_model.drive_table(found.case).battery.capacity_Ah is not None
-        return f"{'flight time':<12}{'':<28}{shown(hover['minutes'], 'min' if known else 'min per A h of capacity')}"
-    gives = f"{full['thrust_N'].value:.1f} N" if math.isfinite(full["thrust_N"].value) else "an unknown maximum"
-    return f"no hover: each rotor needs {hover['thrust_N'].value:.1f} N and gives {gives}"
+    hover = found.hover
+    if not (why := found.no_hover):
+        t = drive_model.drive_table(found.case)
+        time = shown(hover["minutes"], "min" if t.battery.capacity_Ah is not None else "min per A h of capacity")
+        return f"{'flight time':<12}{'':<28}{time}, on {1.0 - t.soc_min:.0%} of the battery"
+    return f"no hover: {why}"
 
 
 def _assumed(found: DriveResult) -> list[str]:
@@ -409,12 +421,16 @@ def text(found: DriveResult) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _rows(found: DriveResult) -> list[dict[str, float]]:
+    """Steady points over the throttle, with their standard uncertainties."""
+    columns = {k: getattr(found.steady, k) for k in COLUMNS} | {f"u_{k}": v for k, v in found.u.items()}
+    return [{k: float(v[i]) for k, v in columns.items()} for i in range(found.steady.rpm.size)]
+
+
 def write(found: DriveResult, out: str | Path) -> None:
     """Write document, curve and picture to a folder, never over a file of the case."""
-    folder, steady = Path(out), found.steady
+    folder, steady, rows = Path(out), found.steady, _rows(found)
     outputs.check("--out", folder, RESULTS, found.case.files())
-    rows = [{k: float(getattr(steady, k)[i]) for k in COLUMNS} | {f"u_{k}": float(v[i]) for k, v in found.u.items()}
-            for i in range(steady.rpm.size)]  # fmt: skip
     write_atomic(folder / RESULTS[0], json_text(found.to_dict()))
     write_atomic(folder / RESULTS[1], csv_text(list(rows[0]), rows))
     panels: list[dict[str, Any]] = [

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from bemt.base.action import as_html, did_you_mean
+from bemt.base.action import Answered, did_you_mean
 from bemt.base.document import Documented
 from bemt.base.errors import EXIT_INPUT, EXIT_OK, Fault, InputError, gathered, refuse
 from bemt.base.plugins import missing, tool_of
@@ -334,8 +334,8 @@ def _errors_text(error: Mapping[str, Any]) -> list[str]:
 
 
 def _targets_text(told: ManifestContents, out: Path) -> list[str]:
-    """What each target holds, and how well."""
-    lines = []
+    """What each target holds, and how well; a note that several have is told once."""
+    lines, said = [], set[str]()
     for one in told.targets:
         files = ", ".join(f.path for f in one.files)
         lines += [f"{told.name} as {one.title}, in {out / one.target}: {files}", f"  holds {one.holds}"]
@@ -351,7 +351,8 @@ def _targets_text(told: ManifestContents, out: Path) -> list[str]:
             )
             lines.append(f"  standard uncertainty of the prediction: {words} ({band.origin})")
             lines += [f"  ! {flag}" for flag in band.flags]
-        lines += [f"  note: {note}" for note in one.notes]
+        lines += [f"  note: {note}" for note in one.notes if note not in said]
+        said |= {*one.notes}
     if told.kept:
         lines.append(f"kept from an earlier export into {out}: {', '.join(told.kept)}")
     if told.stale:
@@ -398,7 +399,7 @@ ANSWER = "bemt.export/1"
 
 
 @dataclass(frozen=True, eq=False)
-class Exported:
+class Exported(Answered):
     """Cases that were written for other programs.
 
     Parameters
@@ -436,15 +437,9 @@ class Exported:
         """Why, a line each."""
         return tuple(str(error) for error in self.refused)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values, ``bemt.export/1``."""
+    def _document(self) -> dict[str, Any]:
+        """``bemt.export/1``."""
         return {"schema": ANSWER, "cases": [dict(one) for one in self.manifests]}
-
-    def __str__(self) -> str:
-        return self.text
 
     def __repr__(self) -> str:
         return f"<export of {', '.join(str(one['name']) for one in self.manifests)}: {len(self.files)} files>"
-
-    def _repr_html_(self) -> str:
-        return as_html(repr(self)[1:-1], self.text)

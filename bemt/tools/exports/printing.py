@@ -201,7 +201,10 @@ def _changes(case: Case, before: Rotor, after: Rotor, least_mm: float) -> Widene
 
 def printed_text(printed: AsPrinted) -> list[str]:
     """Lines for the terminal."""
-    lines = [f"printed with a least thickness of {printed.least_thickness_mm:g} mm"]
+    lines = [
+        f"printed with a least thickness of {printed.least_thickness_mm:g} mm",
+        "strength and highest speed are not judged: bemt design keeps a blade within the strength of its material",
+    ]
     if isinstance(printed, Widened):
         old, new = printed.tip_chord_mm
         finer = f". A finer nozzle keeps it: --nozzle-mm {FINE_MM:g}" if old >= TIP_CHORD * LINES * FINE_MM else ""

@@ -8,10 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from bemt.base.action import Told, action, in_words
+from bemt.base.action import Answered, Told, action
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, gathered, refuse
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from bemt.base.errors import Fault
     from bemt.tools.flight.answer import FlightAnswer
     from bemt.tools.flight.log import FlightLog
@@ -23,7 +25,7 @@ _FAR = 5.0  # ratio of thrusts at one speed that is no scatter of propellers: ha
 
 
 @dataclass(frozen=True, eq=False)
-class FlightsAnswer:
+class FlightsAnswer(Answered):
     """Answers on one or more flights."""
 
     flights: tuple[FlightAnswer, ...]  # In the order of the logs
@@ -32,10 +34,6 @@ class FlightsAnswer:
     learnt: str = ""  # What the case learnt, and where it was written
     converged: bool = True  # Whether that case could be solved
     mass_kg: float | None = None  # Mass that was stated [kg]
-
-    def __str__(self) -> str:
-        """Text without details, with parameters in place of options."""
-        return in_words(self.text)
 
     def __repr__(self) -> str:
         """Say the verdict in a line."""
@@ -74,7 +72,13 @@ class FlightsAnswer:
 
         return "\n\n".join([*(text(a, details) for a in self.flights), *([self.learnt] if self.learnt else [])])
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_pandas(self) -> pd.DataFrame:
+        """The table, a row a flight."""
+        import pandas as pd
+
+        return pd.DataFrame(self.table())
+
+    def _document(self) -> dict[str, Any]:
         """JSON of schema bemt.flight/1: one flight, or `flights`."""
         documents = [a.document() for a in self.flights]
         if len(documents) == 1 and not self.folder:
@@ -162,7 +166,12 @@ def fly(
     """
     if layout == "list":
         return Told(layouts(), "\n".join(f"{name:<14} {places}" for name, places in layouts().items()))
+    from bemt.base.given import number
+
     given = [logs] if isinstance(logs, str | os.PathLike) else list(logs)
+    for name, mass in (("mass_kg", mass_kg), ("healthy_mass_kg", healthy_mass_kg)):
+        if mass is not None:
+            number(name, mass)
     refuse(_unusable(given, healthy, out_case, case))
     folder = any(Path(p).is_dir() for p in given)
     answers, refused = _answers(given, _grouped(healthy), folder, mass_kg, layout, healthy_mass_kg, healthy_day)

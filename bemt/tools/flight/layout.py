@@ -156,7 +156,8 @@ def mass_faults(log: FlightLog, mass_kg: float | None, name: str) -> list[Fault]
         return []
     lifted = (2.0 * _RHO * area * most**2) ** (1.0 / 3.0) / G0
     source = f"{_MARGIN:g} times the {number_text(amps, 2)} A logged" if amps > 0.0 else f"{_MOST_A:g} A"
-    got = f"{mass_kg:g} kg, which takes {number_text(least, 2)} W to hover on rotors of {D:.2g} m"
+    size = f"{D:.2g} m, the largest at the logged speed" if D < _LARGEST else f"even {D:g} m"
+    got = f"{mass_kg:g} kg, which takes {number_text(least, 2)} W to hover, with rotors of {size}"
     expected = f"less than {number_text(lifted, 2)} kg, hovering on the battery's voltage and {source}"
     return [Fault(log.file, name, got, expected, "In grams? Divide by 1000")]
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bemt.base.action import Answered
 from bemt.base.canvas import CYCLE, GREY, STYLE, blank, frame, png
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
 from bemt.base.page import render
@@ -47,7 +48,7 @@ _ASKED = {
 
 
 @dataclass(frozen=True, eq=False)
-class StandAnswer:
+class StandAnswer(Answered):
     """What a sitting found, and how it went."""
 
     case: str
@@ -80,10 +81,7 @@ class StandAnswer:
         """The story in lines."""
         return "\n".join(self.lines)
 
-    def __str__(self) -> str:
-        return self.text
-
-    def to_dict(self) -> dict[str, Any]:
+    def _document(self) -> dict[str, Any]:
         """Plain values of schema ``bemt.stand/1``."""
         return {"schema": SCHEMA, "case": self.case, "found": list(self.found), "stopped": self.stopped,
                 "there": None if self.there is None else list(self.there), "end": self.course.end,
