@@ -6,6 +6,7 @@ Which column is which load: :mod:`bemt.data.recordings.cfd_loads`.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -20,7 +21,7 @@ from bemt.base.tables import number_of, number_text, text_table
 from bemt.data import readers
 from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import RunToml
-from bemt.data.readers.headings import channel_of
+from bemt.data.readers.headings import channel_of, meanings
 from bemt.data.recordings.cfd_files import EXPORT, PROGRAMS, Settled, cfd_files, clock_of, read_run, settled, zone_of
 from bemt.data.recordings.cfd_loads import (
     CHANNEL,
@@ -52,6 +53,7 @@ _GRIDS = frozenset(("cells", "cell_size"))
 _POINT = ("rpm", "airspeed_m_s", "density_kg_m3", "J")
 _KNOWN = frozenset((*_COEFFICIENTS, "KT", "KQ", "10KQ", "eta", "eta0", "FM", "time_s"))
 """Names of columns that say the loads once more."""
+_NAMED_LOAD = re.compile(r"force|thrust|torque|moment|lift|drag", re.IGNORECASE)
 _BESIDE = {"force.dat": "moment.dat", "moment.dat": "force.dat"}  # files that OpenFOAM writes beside each other
 
 
@@ -308,6 +310,14 @@ def _table(record: Dataset) -> bool:
 
 def _unused(work: OpenRun, values: Mapping[str, Array]) -> None:
     """Name columns that vary and became nothing: rows that differ in one of them only are no repeats."""
+    for quantity in ("thrust", "torque"):  # a column that no word but the user's made a load
+        told = work.fact(quantity).column
+        if told is not None and quantity not in meanings(told):
+            work.notes.append(f"{quantity} is {told}, as stated")
+    left = [c.name for c in work.columns if c.record.clock and not c.part and c.name not in work.used]
+    left = [n for n in left if channel_of(n) not in _KNOWN and not other_than_loads([n]) and _NAMED_LOAD.search(n)]
+    if left:
+        work.notes.insert(0, f"not used: {', '.join(dict.fromkeys(left))}; --column says what it is")
     rest = [c for c in work.columns if _table(c.record) and c.name not in work.used and moves(c.record[c.name])]
     rest = [c for c in rest if channel_of(c.stem) not in _KNOWN]
     if not rest:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -264,7 +265,7 @@ def references_of(run: Dataset, where: str) -> list[Reference]:
                 continue
             state = {k: float(run[k][i]) for k in ("rpm", "airspeed_m_s", "density_kg_m3") if k in run}
             out.append(Reference(
-                quantity, value, float(run.u[channel][i]), channel, "cfd", run.name, conditions_text(setup),
+                quantity, value, float(run.u[channel][i]), channel, "cfd", Path(run.name).name, conditions_text(setup),
                 f"{number_text(value, 4)} {unit}", where=f"{where}:{i + 1}", sha256=sha256, setup=setup, **state,
             ))  # fmt: skip
     return out

@@ -166,9 +166,9 @@ def along(
 
 
 def _within(R: float, r: Array, path: Path, run: str) -> None:
-    """Refuse radii beyond the tip, which are in another unit, and those that leave outer bands without a slice."""
+    """Refuse radii beyond the tip, or short of every band: they are in another unit."""
     top = float(r.max()) / R
-    if BANDS[-2] < top <= BEYOND:
+    if BANDS[0] < top <= BEYOND:
         return
     near = [e for e in unit_errors.errors("length") if BANDS[-2] < top * e.repair <= BEYOND and e.stated == "m"]
     hint = f"{near[0].actual} in a column of {near[0].stated}?" if near else "Slices reach from the root to the tip"
