@@ -169,7 +169,7 @@ _SHORT = 20.0  # Of the rounding of a number: below, it has two digits or fewer
 
 def _off(line: int, what: str, whole: float, of: str, parts: Sequence[float]) -> list[str]:
     """Note on a sum that is not that of its parts."""
-    rounded = 0.5 * sum(float(10.0 ** Decimal(repr(v)).as_tuple().exponent) for v in (whole, *parts))  # as printed
+    rounded = 0.5 * sum(10.0 ** int(Decimal(repr(v)).as_tuple().exponent) for v in (whole, *parts))  # as printed
     limit = max(1e-4 * sum(map(abs, parts)), rounded if abs(whole) < _SHORT * rounded else 0.0, 1e-300)
     if not parts or abs(whole - sum(parts)) <= limit:
         return []

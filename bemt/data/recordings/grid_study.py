@@ -10,7 +10,9 @@ GCI21 = Fs |e21/f1| / (r21^p - 1) with Fs = 1.25 for three grids and 3.0 for two
 
 The index means something only when the values fall into line: `flags` name oscillation, divergence, an implausible
 order and small refinement ratios. Then `u_relative` no longer rests on the order but on the largest difference between
-the grids (factor 3, after Eca and Hoekstra).
+the grids (factor 3, after Eca and Hoekstra). Above the highest plausible order it goes over from the index at that
+order to the spread, linearly up to twice the order: that an excess over the formal order costs in proportion is Xing's
+and Stern's idea (J. Fluids Eng. 132(6), 061403, 2010; not checked against the paper), the ramp is ours.
 
 References
 ----------
@@ -205,7 +207,12 @@ def grid_study(
     fine = fs * abs(e21 / f[0]) / factor
     coarse = fs * abs(e32 / f[1]) / (r[1] ** p - 1.0) if len(f) == 3 else None
     asymptotic = coarse / (r[0] ** p * fine) if coarse is not None and fine > 0.0 else None
-    u = max(fine, 3.0 * spread if flag and len(f) == 3 else 0.0) / COVERAGE
+    highest = ORDERS[1] * formal_order
+    if flag and len(f) == 3 and p > highest:  # no jump at the limit: the index there goes over into the spread
+        least, over = fs * abs(e21 / f[0]) / (r[0] ** highest - 1.0), min(p / highest - 1.0, 1.0)
+        u = (least + over * max(3.0 * spread - least, 0.0)) / COVERAGE
+    else:
+        u = max(fine, 3.0 * spread if flag and len(f) == 3 else 0.0) / COVERAGE
     return GridStudy(f, r, p, f[0] - e21 / factor, fine, coarse, asymptotic, fs, u, tuple(flags))
 
 
