@@ -16,10 +16,9 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault
-from bemt.data.readers._words import english, quantities
 from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import QUANTITIES, RunColumn, RunToml
-from bemt.data.readers.headings import CELLS, channel_of, may_be_shaft_speed, meanings
+from bemt.data.readers.headings import CELLS, channel_of, may_be_shaft_speed, meanings, other_dimension
 from bemt.data.recordings.cfd_files import Settled, settled, zone_of
 from bemt.data.recordings.cfd_setup import Elsewhere
 from bemt.physics.dataset import Dataset
@@ -149,7 +148,7 @@ class OpenRun:
                 self.fault(None, f"columns.{quantity}.column", repr(told), f"one of {known}")
             dimension = QUANTITIES[quantity][0]
             for c in hits[:1]:
-                if not unit_of(c.unit) and (other := _other_dimension(c.stem, dimension)):
+                if not unit_of(c.unit) and (other := other_dimension(c.stem, dimension)):
                     got = f"a column of {other.replace('_', ' ')} for the {quantity}"
                     self.fault(c, c.name, got, f"one of {dimension.replace('_', ' ')}")
             return hits
@@ -286,16 +285,6 @@ def other_than_loads(names: Iterable[str]) -> str:
     if any(pattern.search(name) for name in own for pattern in loads):
         return ""
     return next((what for what, pattern in _OTHER.items() if any(map(pattern.search, own))), "")
-
-
-def _other_dimension(heading: str, dimension: str) -> str:
-    """Dimension that a word of a heading names, where none names the wanted one; "" for any other heading.
-
-    >>> _other_dimension("total-to-static-pressure-op", "force"), _other_dimension("report-def-0", "force")
-    ('pressure', '')
-    """
-    named = [d for word in english(heading) for _, d in quantities([word])]
-    return "" if dimension in named else next(iter(named), "")
 
 
 def _fits(c: LoadColumn, quantity: str) -> bool:
