@@ -382,7 +382,8 @@ QPROP takes the reference Reynolds number of the first station for all (a slip o
 
 ## Solids
 
-{", ".join(kinds["solid"])}: the shape; `flow` is the air around it, `openfoam` a case that finds the loads.
+{", ".join(kinds["solid"])}: the shape; `flow` is the air around it, `zone` the cylinder
+that turns, `openfoam` a case that finds the loads.
 An STL has one named solid per surface, and they are closed together: merge equal corners
 (`trimesh.load(FILE, force="mesh")`, then `merge_vertices()`). OBJ, 3MF and STEP are closed as they are read.
 

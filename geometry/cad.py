@@ -363,7 +363,7 @@ def solids(rotor: Rotor, duct: Duct | None = None, options: Options | None = Non
 
 
 COLOURS = {"blade": (0.2, 0.3, 0.6), "hub": (0.4, 0.4, 0.4), "duct": (0.8, 0.8, 0.8), "stator": (0.6, 0.6, 0.6),
-           "flow": (0.9, 0.95, 1.0)}  # fmt: skip
+           "flow": (0.9, 0.95, 1.0), "rotating_zone": (1.0, 0.9, 0.8)}  # fmt: skip
 FAR = ("far_field_inlet", "far_field_outlet", "far_field_side")
 """Names of the box round the flow: ahead of the rotor, behind it, beside it."""
 
@@ -411,8 +411,17 @@ def _wall_name(duct: Duct, radius: Array, x: Array) -> str:
     return "duct_inner" if np.sum(radius - middle) < 0.0 else "duct_outer"
 
 
+BOX = (10.0, 5.0, 10.0)
+"""Far field in diameters: width of the box, reach upstream and downstream [1]."""
+
+
 def flow_domain(
-    parts: Parts, rotor: Rotor, duct: Duct | None = None, wide: float = 10.0, ahead: float = 5.0, behind: float = 10.0
+    parts: Parts,
+    rotor: Rotor,
+    duct: Duct | None = None,
+    wide: float = BOX[0],
+    ahead: float = BOX[1],
+    behind: float = BOX[2],
 ) -> tuple[Any, list[tuple[Any, str]]]:
     """Air round a rotor and its duct as one solid in millimetres, a box less the parts, and its faces with their names.
 
@@ -445,6 +454,41 @@ def flow_domain(
         got = f"air without {', '.join(sorted(lost)) or 'a name for every face'}"
         raise GeometryError([("flow", got, "a boundary of every part", "Use step, and cut the box in the mesher")])
     return air, out
+
+
+ZONE = ("zone_upstream", "zone_downstream", "zone_side")
+"""Names of the faces of a rotating zone."""
+_MARGIN, _OPEN = 0.15, 1.1
+
+
+def rotating_zone(
+    parts: Parts, rotor: Rotor, duct: Duct | None = None
+) -> tuple[Any, list[tuple[Any, str]], tuple[float, float, float]]:
+    """Cylinder that turns with the rotor, for MRF or a sliding mesh: its solid in millimetres, its faces, its size [m].
+
+    The size is the radius, and the height of both ends above the rotor's plane. The cylinder holds blades and hub with
+    0.15 R on either side, and reaches to 1.1 R, or to the middle of the gap in a duct. Towards vanes it ends halfway.
+    Nothing is cut out of it: a mesher takes it as a body of the air, or as the surface of a zone of cells.
+    """
+    cq = needs("cadquery", "cad")
+
+    def span(*surfaces: str) -> tuple[float, float]:
+        boxes = [solid.BoundingBox() for surface, _, solid in parts.solids if surface in surfaces]
+        return (min(b.zmin for b in boxes) / MM, max(b.zmax for b in boxes) / MM) if boxes else (-math.inf, -math.inf)
+
+    (low, high), margin = span("blade", "hub"), _MARGIN * rotor.R
+    vanes = span("stator")[1]
+    bottom = low - margin if vanes < low - 2.0 * margin else 0.5 * (low + min(vanes, low))
+    if vanes > low:  # a body that the hub stands on
+        bottom = low
+    top, radius = high + margin, _OPEN * rotor.R if duct is None else rotor.R + 0.5 * duct.gap
+    solid = cq.Solid.makeCylinder(radius * MM, (top - bottom) * MM, cq.Vector(0, 0, bottom * MM))
+    ends = {True: ZONE[0], False: ZONE[1]}
+    faces = [
+        (f, ZONE[2] if f.geomType() == "CYLINDER" else ends[f.Center().z > 0.5 * (top + bottom) * MM])
+        for f in solid.Faces()
+    ]
+    return solid, faces, (radius, bottom, top)
 
 
 def _near(box: Any, at: Any, by: float) -> bool:

@@ -26,7 +26,7 @@ from geometry.mesh import MeshModel, Options, build
 from geometry.rotor import Rotor
 from geometry.solid import Mesh
 
-FORMATS = ("stl", "step", "flow", "obj", "3mf", "openfoam")
+FORMATS = ("stl", "step", "flow", "zone", "obj", "3mf", "openfoam")
 UNITS = {"mm": 1e-3, "m": 1.0, "in": 0.0254}
 SCHEMA = "geometry.export/1"
 MANIFEST = "manifest.json"
@@ -108,14 +108,14 @@ def _written(
         return _openfoam(model, work)
     if word == "3mf":
         return [_three_mf(model, work, name)]
-    if word not in ("step", "flow"):
+    if word not in ("step", "flow", "zone"):
         return [_meshes(model, work, name, word, unit)]
     from geometry.cad import kernel
 
     with kernel(word, "a solid that it makes", "Use stl, obj, 3mf or openfoam, which need no kernel"):
-        made = (_step(rotor, duct, work, name, unit, model, volumes) if word == "step"
-                else _flow(rotor, duct, work, name, unit, model))  # fmt: skip
-    return [made]
+        if word == "step":
+            return [_step(rotor, duct, work, name, unit, model, volumes)]
+        return (_flow if word == "flow" else _zone)(rotor, duct, work, name, unit, model)
 
 
 def _rounded(value: Any) -> Any:
@@ -293,27 +293,66 @@ def _step(
     return Written(path.name, "step", unit, True, surfaces, [part for _, part, _ in parts.solids], faces)
 
 
-def _flow(rotor: Rotor, duct: Duct | None, work: Path, name: str, unit: str, model: MeshModel) -> Written:
-    """Air round the parts, in a box, its faces named; read back it must be one valid solid of the same volume."""
+def _flow(
+    rotor: Rotor, duct: Duct | None, work: Path, name: str, unit: str, model: MeshModel
+) -> list[Written]:  # fmt: skip
+    """Air round the parts, in a box, its faces named."""
+    from geometry.cad import BOX, flow_domain, solids
+
+    _aerodynamic("flow", model)
+    air, faces = flow_domain(solids(rotor, duct, model.options), rotor, duct)
+    wide, ahead, behind = BOX
+    says = (f"far field {wide:g} D wide ({wide * rotor.D:.4g} m), {ahead:g} D ahead of the rotor, "
+            f"{behind:g} D behind it")  # fmt: skip
+    return [_one_body(work, f"{name}_flow.step", "flow", "flow", air, faces, unit, says)]
+
+
+def _zone(
+    rotor: Rotor, duct: Duct | None, work: Path, name: str, unit: str, model: MeshModel
+) -> list[Written]:  # fmt: skip
+    """Cylinder that turns with the rotor, as STEP and as STL of three named solids."""
+    from geometry.cad import rotating_zone, solids
+
+    _aerodynamic("zone", model)
+    solid, faces, (radius, low, high) = rotating_zone(solids(rotor, duct, model.options), rotor, duct)
+    says = f"cylinder of radius {radius:.5g} m, from z {low:.5g} to {high:.5g} m"
+    body = _one_body(work, f"{name}_zone.step", "zone", "rotating_zone", solid, faces, unit, says)
+    text, path = [], work / f"{name}_zone.stl"
+    for face, word in faces:
+        corners, triangles = face.tessellate(1e-4 * radius * 1e3, 0.05)
+        vertices = np.array([v.toTuple() for v in corners]) * 1e-3 / UNITS[unit]
+        text.append(_stl(vertices, np.array(triangles, dtype=np.int64), f"{word} unit={unit}"))
+    path.write_text("".join(text), encoding="ascii")
+    named = [{"name": word} for _, word in faces]
+    return [body, Written(path.name, "zone", unit, "the named solids together", named)]
+
+
+def _aerodynamic(word: str, model: MeshModel) -> None:
+    """Refuse a printed rotor where the shape in the air is meant."""
+    if model.options.printed is not None:
+        raise GeometryError([(word, "a printed rotor", "the aerodynamic shape", "Leave out the options of printing")])
+
+
+def _one_body(
+    work: Path, file: str, form: str, body: str, air: Any, faces: Sequence[tuple[Any, str]], unit: str, says: str
+) -> Written:  # fmt: skip
+    """Write a solid with its faces named; read back it must be one valid solid of the same volume."""
     cq = needs("cadquery", "cad")
 
-    from geometry.cad import COLOURS, flow_domain, solids
+    from geometry.cad import COLOURS
 
-    if model.options.printed is not None:
-        raise GeometryError([("flow", "a printed rotor", "the aerodynamic shape", "Leave out the options of printing")])
-    air, faces = flow_domain(solids(rotor, duct, model.options), rotor, duct)
-    whole = cq.Assembly(name=name)
-    whole.add(air, name="flow", color=cq.Color(*COLOURS["flow"]))
+    whole = cq.Assembly(name=file.rsplit("_", 1)[0])
+    whole.add(air, name=body, color=cq.Color(*COLOURS[body]))
     for face, word in faces:
-        whole.objects["flow"].addSubshape(face, name=word, layer=word)
-    path = work / f"{name}_flow.step"
+        whole.objects[body].addSubshape(face, name=word, layer=word)
+    path = work / file
     _write_step(whole, path, unit)
     back = cq.importers.importStep(str(path)).solids().vals()
     if len(back) != 1 or not back[0].isValid() or abs(back[0].Volume() / air.Volume() - 1.0) > 1e-4:
         got = f"{len(back)} solids when read back"
         raise GeometryError([(path.name, got, "one valid solid of the same volume", "")])
-    surfaces = [{"name": "flow", "volume_m3": air.Volume() * 1e-9}]
-    return Written(path.name, "flow", unit, True, surfaces, ["flow"], sorted({word for _, word in faces}))
+    surfaces = [{"name": body, "volume_m3": air.Volume() * 1e-9, "extent": says}]
+    return Written(path.name, form, unit, True, surfaces, [body], sorted({word for _, word in faces}))
 
 
 def _write_step(whole: Any, path: Path, unit: str) -> None:

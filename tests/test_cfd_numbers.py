@@ -448,3 +448,11 @@ def test_a_recorded_value_is_audited_by_its_remark(CT: float) -> None:
     found = Audit.of("cfd 2.6 kgf", facts)
     assert found.reference == "cfd 2.6 kgf" and [line.topic for line in found.lines] == TOPICS
     assert Audit.from_document(json.loads(json_text(found.document()))).lines[0].status == found.lines[0].status
+
+
+def test_the_uncertainty_does_not_jump_where_an_order_passes_the_limit() -> None:
+    """Torque of three grids: u rose from 0.5 to 7.4 % as the coarse value moved by one in a thousand."""
+    coarse = np.linspace(0.0935, 0.0960, 101)
+    found = [grid_study([0.0914, 0.0921, c], ratios([7.6e6, 2.9e6, 1.1e6])) for c in coarse]
+    orders, u = np.array([s.order for s in found]), np.array([s.u_relative for s in found])
+    assert orders.min() < 3.0 < orders.max() and np.abs(np.diff(u)).max() < 0.003

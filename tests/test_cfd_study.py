@@ -321,3 +321,56 @@ def test_a_height_is_no_size_of_cells(tmp_path: Path, monkeypatch: pytest.Monkey
     Path("ground.csv").write_text("h [mm],rpm,thrust (N)\n" + rows)
     told = import_("ground.csv")
     assert "a height, or the size of cells?" in told.text and len(import_file("ground.csv")) == 3
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Design Points,rpm [rev min^-1],Vinf [m s^-1],thrust [lbf],torque [ozf in]\nDP0,6000,4,1,10\n",
+        "Name,P1 - rpm [rpm],P2 - Vinf [m/s],P3 - thrust-op [lbf],P4 - torque-op [ozf in]\nDP 0,6000,4,1,10\n",
+        "# a project\nName,P1 - rpm,P2 - Vinf,P3 - thrust,P4 - torque\nUnits,rpm,m/s,lbf,ozf in\nDP 0,6000,4,1,10\n",
+        "Name,rpm [rpm],V [m/s],thrust [lbf],torque [ozf in]\nDP0,6000,4,1,10\n",
+    ],
+)
+def test_a_table_of_workbench_has_its_units_in_the_headings_or_in_a_row(tmp_path: Path, text: str) -> None:
+    (tmp_path / "dp.csv").write_text(text)
+    found = run_at(str(tmp_path / "dp.csv"))
+    assert found is not None and found["rpm"] == pytest.approx([6000]) and found["airspeed_m_s"] == pytest.approx([4])
+    assert found["thrust_N"] == pytest.approx([4.4482216]) and found["torque_Nm"] == pytest.approx(
+        [0.0706155], rel=1e-5
+    )
+    with pytest.raises(InputError, match="got N, where the file says lbf"):
+        assemble(run_from([str(tmp_path / "dp.csv")], unit=["thrust=N"]))
+
+
+def zoned(folder: Path, name: str, blade: float, hub: float, cells: float, rpm: float, zones: str) -> str:
+    head = '"t"\n"Iteration" "t etc.."\n("Iteration" "thrust(blade)" "thrust(hub)" "torque")\n'
+    (folder / f"{name}.out").write_text(head + "".join(f"{k} {blade} {hub} 0.1\n" for k in range(300)))
+    run = run_from([str(folder / f"{name}.out")], rpm=rpm, zones=[zones], unit=["thrust=N", "torque=N m"],
+                   setup=[f"cells={cells}"])  # fmt: skip
+    return str(write_run(run, str(folder / f"{name}.toml")))
+
+
+def test_grids_of_one_study_have_one_speed_and_the_same_zones(tmp_path: Path) -> None:
+    fine = zoned(tmp_path, "fine", 5.3, 0.1, 4e6, 6000.0, "blade,hub")
+    bare = zoned(tmp_path, "bare", 5.1, 0.1, 1e6, 6000.0, "blade")
+    fast = zoned(tmp_path, "fast", 5.2, 0.1, 1e6, 6500.0, "blade,hub")
+    with pytest.raises(InputError, match=r"bare.toml: zones: got thrust of blade; expected blade \+ hub, as fine"):
+        together([import_file(fine), import_file(bare)])
+    with pytest.raises(InputError, match=r"fast.toml: got 6500 rev/min; expected .*6000 rev/min"):
+        together([import_file(fine), import_file(fast)])
+    good = zoned(tmp_path, "coarse", 5.1, 0.1, 1e6, 6000.0, "blade,hub")
+    assert together([import_file(fine), import_file(good)])["thrust_N"] == pytest.approx([5.4])
+
+
+def test_what_a_run_holds_beside_its_load_is_named_before_a_unit(tmp_path: Path, project: Path) -> None:
+    """The duct's zone left out, half of the thrust: no unit is wrong."""
+    head = '"t"\n"Iteration" "t etc.."\n("Iteration" "thrust-rotor" "thrust-duct" "torque")\n'
+    (tmp_path / "t.out").write_text(head + "".join(f"{k} 13.1 12.2 -0.27\n" for k in range(300)))
+    run = run_from([str(tmp_path / "t.out")], rpm=55000.0, zones=["thrust-rotor"], unit=["thrust=N", "torque=N m"])
+    made = write_run(run, str(tmp_path / "run.toml"))
+    found = compare(made, case=project / "cases" / "ds30", figures=False)
+    assert "Thrust with thrust-duct is 25.30 N: check the zones" in str(found.to_dict()["sentence"])
+    with pytest.raises(InputError, match="got a column of pressure for the thrust"):
+        (tmp_path / "fan.csv").write_text("Design Points,rpm [rpm],total-pressure-op,torque [N m]\nDP0,6000,25,0.06\n")
+        assemble(run_from([str(tmp_path / "fan.csv")], column=["thrust=total-pressure-op"], unit=["thrust=N"]))

@@ -133,3 +133,41 @@ def test_loads_beside_too_few_readings_are_read_and_shown(project: Path, tmp_pat
     (tmp_path / "radial.csv").write_text("\n".join([head, *lines]) + "\n")
     found = bemt.diagnose(tmp_path / "one.csv", along=tmp_path / "radial.csv", **given)
     assert found.verdict == "insufficient" and "a" in found.to_dict()["along_blade"] and "0.84-0.95 R" in found.text
+
+
+def slices(tmp_path: Path, name: str, head: str, scale: float, columns: tuple[np.ndarray, ...]) -> Path:
+    rows = "".join(f"{r * scale:.9g},{T:.9g},{Q:.9g}\n" for r, T, Q in zip(*columns, strict=True))
+    (tmp_path / name).write_text(f"{head}\n{rows}")
+    return tmp_path / name
+
+
+def test_slices_are_compared_at_the_speed_of_the_recording(tmp_path: Path) -> None:
+    """Made by the model at 6000 rev/min: at the case's own speed they would name a cause that is none."""
+    import bemt
+    from bemt.base.errors import InputError
+
+    case = bemt.propeller("10x5", rpm=9000).case
+    model = prepare_case(case)
+    s = solver.solve(model.prep, 6000.0, 0.0, case.air(), radial=True)
+    dr = model.prep.st[:, 1]
+    made = np.broadcast_to(s.radial.r, (1, dr.size))[0], s.radial.dT[0] / dr, s.radial.dQ[0] / dr
+    whole = [float(np.trapezoid(v, made[0])) for v in made[1:]]
+    run = tmp_path / "run.csv"
+    run.write_text(f"rpm,airspeed_m_s,thrust_N,torque_Nm,cells\n6000,0,{whole[0]},{whole[1]},1e6\n")
+    path = slices(tmp_path, "s.csv", "r [mm],dT/dr [N/m],dQ/dr [N m/m]", 1e3, made)
+    found = bemt.diagnose(run, case, along=path)
+    (told,) = found.to_dict()["along_blade"].values()
+    assert "at 6000 rev/min" in told["state"] and not told["whole"] and not told["named"]
+    assert np.allclose(told["thrust_ratio"], 1.0, atol=0.01)
+    (told,) = bemt.diagnose(run, case, along=path, rpm=6500).to_dict()["along_blade"].values()
+    assert "at 6500 rev/min" in told["state"] and min(told["thrust_ratio"]) > 1.1
+    one = slices(tmp_path, "one.csv", "r [mm],dT/dr [N/m],dQ/dr [N m/m]", 1e3, (made[0], made[1] / 2, made[2] / 2))
+    (told,) = bemt.diagnose(run, case, along=one).to_dict()["along_blade"].values()
+    assert "are they of all blades" in told["whole"] and not told["named"]
+    with pytest.raises(InputError, match="mm in a column of m"):
+        along(case, slices(tmp_path, "mm.csv", "r_m,thrust_per_radius_N_m,torque_per_radius_Nm_m", 1e3, made))
+    with pytest.raises(InputError, match=r"dT/dr: got no unit"):
+        along(case, slices(tmp_path, "bare.csv", "r [m],dT/dr,dQ/dr [N]", 1.0, made))
+    run.write_text("rpm,airspeed_m_s,thrust_N,torque_Nm\n" + "".join(f"{n},0,5,0.1\n" for n in (5000, 6000, 7000)))
+    with pytest.raises(InputError, match="slices without a speed, and 3 readings at 5000 to 7000 rev/min"):
+        bemt.diagnose(run, case, along=path)

@@ -341,6 +341,32 @@ def test_every_face_of_a_step_has_the_name_of_its_boundary(small_fan: tuple[Path
     assert written.count("far_field_side") == 4 and written.count("far_field_inlet") == 1
 
 
+def test_the_zone_that_turns_holds_the_rotor_and_no_vane(tmp_path: Path) -> None:
+    from geometry.cad import rotating_zone
+
+    rotor = Rotor(helix(0.1, 0.1, "fan", hub=0.35, anchors=naca4(0.04, 0.4, 0.1)), 2)
+    duct = around(rotor, 0.07, 0.0008, 0.005, exit_area_ratio=0.95, exit_hub_radius=0.01, stator=Stator(2, 0.02))
+    made = export(rotor, duct, tmp_path, ["zone"], name="fan")
+    (body, mesh) = made["files"]
+    assert set(body["faces"]) == {"zone_upstream", "zone_downstream", "zone_side"}
+    assert [s["name"] for s in mesh["surfaces"]] != [] and "radius 0.0504 m" in body["surfaces"][0]["extent"]
+    solid, _, (radius, low, high) = rotating_zone(parts := solids(rotor, duct), rotor, duct)
+    for surface, _, one in parts.solids:
+        box = one.BoundingBox()
+        if surface in ("blade", "hub"):
+            assert low - 1e-9 <= box.zmin / 1e3 and box.zmax / 1e3 <= high
+        elif surface == "stator":
+            assert box.zmax / 1e3 <= low + 1e-9
+    from geometry.export import read_solid
+
+    text = (tmp_path / "fan_zone.stl").read_text()
+    vertices, faces, unit = read_solid(tmp_path / "fan_zone.stl")
+    trimesh = pytest.importorskip("trimesh")
+    closed = trimesh.Trimesh(vertices, faces, process=False)
+    assert unit == "mm" and text.count("endsolid") == 3 and closed.is_watertight
+    assert closed.volume == pytest.approx(solid.Volume(), rel=2e-3)
+
+
 def test_no_vane_stands_on_a_seam() -> None:
     """A vane whose edges lie on the seams of duct and body left no air at all: fans of 70 and 254 mm."""
     rotor = Rotor(helix(0.07, 0.1, "fan", hub=0.35, anchors=naca4(0.04, 0.4, 0.1)), 2)

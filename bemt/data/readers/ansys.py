@@ -215,12 +215,15 @@ def read_fluent_ascii(path: str | os.PathLike[str]) -> Dataset:
 #     Name,P1,P2
 #     DP 0,8000,3.6
 #
-# or, as the parametric study of Fluent saves it, ``Design Points,rpm,thrust-op`` without units.
+# or, as the parametric study of Fluent saves it, ``Design Points,rpm,thrust-op``. A unit stands in the heading, or in a
+# row ``Units``.
 
 DESIGN_POINTS = "design_points"
 
-_HEAD = re.compile(r"(Name\s*[,;]\s*P\d|Design Points?\s*[,;])", re.IGNORECASE)
-_PARAMETER = re.compile(r"\s*(P\d+) - (.*?)\s*(?:\[([^\]]*)\])?\s*")
+_HEAD = re.compile(r"(Name\s*[,;]\s*\"?P\d|Design Points?\s*[,;])", re.IGNORECASE)
+_NAMED = re.compile(r"\"?Name\"?\s*[,;]", re.IGNORECASE)
+_POINT = re.compile(r"\"?DP ?\d+\"?\s*[,;]|Units\s*[,;]", re.IGNORECASE)
+_PARAMETER = re.compile(r"\s*(?:(P\d+) - )?(.*?)\s*(?:\[([^\]]*)\])?\s*")
 
 
 def sniff_design_points(head: bytes | str) -> bool:
@@ -230,17 +233,19 @@ def sniff_design_points(head: bytes | str) -> bool:
     True
     >>> sniff_design_points("Design Points,rpm,T-op\nDP1,1,2")
     True
-    >>> sniff_design_points("Name,a")
-    False
+    >>> sniff_design_points("Name,a"), sniff_design_points("Name,rpm [rpm]\nDP0,6000")
+    (False, True)
     """
     lines = [line for line in head_lines(head) if not line.startswith("#")]
-    return bool(lines) and _HEAD.match(lines[0]) is not None
+    labelled = len(lines) > 1 and _NAMED.match(lines[0]) and _POINT.match(lines[1])
+    return bool(lines) and bool(_HEAD.match(lines[0]) or labelled)
 
 
 def read_design_points(path: str | os.PathLike[str]) -> Dataset:
     """Read design points; one that failed is NaN."""
     source = load_text(path)
     told: dict[str, tuple[str, str]] = {}
+    units: dict[str, str] = {}
     names: tuple[str, ...] = ()
     rows: list[ExportRow] = []
     labels: list[str] = []
@@ -248,18 +253,22 @@ def read_design_points(path: str | os.PathLike[str]) -> Dataset:
     for line, raw in enumerate(source.lines, 1):
         text = raw.strip()
         if text.startswith("#"):
-            found = filter(None, map(_PARAMETER.fullmatch, text.lstrip("# ").split(",")))
+            found = (m for m in map(_PARAMETER.fullmatch, text.lstrip("# ").split(",")) if m and m[1])
             told |= {m[1]: (m[2], m[3] or "") for m in found}
         elif text and not names:
             mark = ";" if ";" in text and "," not in text else ","
             names = cells_of(text, mark)[1:]
         elif text:
             label, *cells = cells_of(text, mark) if not text.endswith(mark) else (*cells_of(text, mark), "")
+            if label.lower() == "units":
+                units = dict(zip(names, cells, strict=False))
+                continue
             labels.append(label)
             rows.append(ExportRow(line, tuple(cell or "nan" for cell in cells)))
     if not names:
         source.refuse("", "no header", "a line such as Name,P1,P2")
-    columns = [Column(words, si_unit(unit) or unit) for words, unit in (told.get(n, (n, "")) for n in names)]
+    heads = ((n, told.get(n) or _headed(n)) for n in names)
+    columns = [Column(words, si_unit(own) or own) for n, (words, unit) in heads for own in (unit or units.get(n, ""),)]
     table = numeric_table(source, columns, rows, mark != ",")
     keys = unique([c.name for c in columns])
     channels = {key: Channel(v, c.unit) for key, c, v in zip(keys, columns, table.values.T, strict=True)}
@@ -267,6 +276,16 @@ def read_design_points(path: str | os.PathLike[str]) -> Dataset:
     about = {**source.about, "clock": "none"}
     notes = (*table.warnings, *no_units(columns))
     return dataset(DESIGN_POINTS, "cfd", channels, notes, about, lines=table.lines, texts=texts)
+
+
+def _headed(name: str) -> tuple[str, str]:
+    """Words and unit of a parameter's heading.
+
+    >>> _headed("P3 - thrust-op [N]"), _headed("thrust [lbf]"), _headed("rpm")
+    (('thrust-op', 'N'), ('thrust', 'lbf'), ('rpm', ''))
+    """
+    found = _PARAMETER.fullmatch(name)
+    return (found[2] or name, found[3] or "") if found else (name, "")
 
 
 READERS = (

@@ -20,6 +20,7 @@ import os
 import re
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from decimal import Decimal
 from typing import NamedTuple
 
 import numpy as np
@@ -163,9 +164,14 @@ def _sums(entries: Sequence[ForceEntry], damaged: bool, line: int) -> list[str]:
     return notes
 
 
+_SHORT = 20.0  # Of the rounding of a number: below, it has two digits or fewer
+
+
 def _off(line: int, what: str, whole: float, of: str, parts: Sequence[float]) -> list[str]:
     """Note on a sum that is not that of its parts."""
-    if not parts or abs(whole - sum(parts)) <= 1e-4 * max(1e-300, sum(map(abs, parts))):
+    rounded = 0.5 * sum(10.0 ** int(Decimal(repr(v)).as_tuple().exponent) for v in (whole, *parts))  # as printed
+    limit = max(1e-4 * sum(map(abs, parts)), rounded if abs(whole) < _SHORT * rounded else 0.0, 1e-300)
+    if not parts or abs(whole - sum(parts)) <= limit:
         return []
     return [f"line {line}: {what} is {whole:.6g}, its {of} add up to {sum(parts):.6g}"]
 

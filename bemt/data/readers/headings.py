@@ -230,6 +230,16 @@ def meanings(text: str) -> list[str]:
     return ["power" if name == "mechanical power" else name.replace(" ", "_") for name in found]
 
 
+def other_dimension(heading: str, dimension: str) -> str:
+    """Dimension that a word of a heading names, where none names the wanted one; "" for any other heading.
+
+    >>> other_dimension("total-to-static-pressure-op", "force"), other_dimension("report-def-0", "force")
+    ('pressure', '')
+    """
+    named = [d for word in english(heading) for _, d in quantities([word])]
+    return "" if dimension in named else next(iter(named), "")
+
+
 def counts_electrical(text: str) -> bool:
     """Tell whether a heading is a speed in electrical revolutions, over no pole pairs yet.
 

@@ -18,14 +18,15 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault
 from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import QUANTITIES, RunColumn, RunToml
-from bemt.data.readers.headings import CELLS, channel_of, may_be_shaft_speed, meanings
+from bemt.data.readers.headings import CELLS, channel_of, may_be_shaft_speed, meanings, other_dimension
 from bemt.data.recordings.cfd_files import Settled, settled, zone_of
+from bemt.data.recordings.cfd_setup import Elsewhere
 from bemt.physics.dataset import Dataset
 
 _ALONG = 3.0  # a thrust stands out of the side forces by this factor, or the shaft is not along an axis
 DUCT = re.compile(r"duct|shroud|nozzle|nacelle|casing|housing|\bring\b|\blip\b|kort", re.IGNORECASE)
 """Name of a zone that is the duct."""
-_NET = ("net", "total", "")
+NET = ("net", "total", "")
 _FORCE = re.compile(r"force_total(?:_([xyz]))?(?:_N)?( along .*)?|C(?:F)([xyz])")
 _MOMENT = re.compile(r"moment_total(?:_([xyz]))?(?:_Nm)?( along .*)?|C(?:M)([xyz])")
 _ASIDE = re.compile(
@@ -116,6 +117,8 @@ class OpenRun:
     faults: list[Fault] = field(default_factory=list)
     used: set[str] = field(default_factory=set)  # names of columns that became something
     size_unit: str = ""  # of a column of cell sizes, SI; "" if not known
+    zones: frozenset[str] = frozenset()  # whose forces are the thrust
+    elsewhere: list[Elsewhere] = field(default_factory=list)
 
     def fault(self, at: LoadColumn | None, where: str, got: str, expected: str, hint: str = "") -> None:
         """Note a fault of a column's file, or of the run."""
@@ -143,6 +146,11 @@ class OpenRun:
             if not hits and self.complete:
                 known = ", ".join(dict.fromkeys(c.name for c in self.columns)) or "none"
                 self.fault(None, f"columns.{quantity}.column", repr(told), f"one of {known}")
+            dimension = QUANTITIES[quantity][0]
+            for c in hits[:1]:
+                if not unit_of(c.unit) and (other := other_dimension(c.stem, dimension)):
+                    got = f"a column of {other.replace('_', ' ')} for the {quantity}"
+                    self.fault(c, c.name, got, f"one of {dimension.replace('_', ' ')}")
             return hits
         taken = {getattr(self.run.columns, q).column for q in QUANTITIES if getattr(self.run.columns, q) is not None}
         return _recorded(
@@ -159,7 +167,7 @@ class OpenRun:
         stated = unit_of(c.unit)
         if told and stated is not None and unit is not None and stated.suffix != unit.suffix:
             got = f"{told}, where the file says {c.unit}"
-            self.fault(c, c.name, got, "the unit of the file", f"Leave out --unit {quantity}=...")
+            self.fault(c, c.name, got, "the unit of the file", f"Leave out --unit {quantity}={told!r}")
             return None
         if not c.unit and not told and (c.of_sound or (c.part and c.axis)):
             factor = self._of_sound(c) if c.of_sound else self._reference(c)
@@ -347,6 +355,26 @@ def by_zone(run: OpenRun, quantity: str) -> dict[str, LoadColumn]:
     return out
 
 
+def other_axes(run: OpenRun, c: LoadColumn) -> list[LoadColumn]:
+    """Components of a vector across the one that a column is."""
+    own = (c.file, c.part, c.zone)
+    return [o for o in run.columns if c.axis and o.axis not in ("", c.axis) and (o.file, o.part, o.zone) == own]
+
+
+def across(run: OpenRun, quantity: str, axis: str, along: float, others: Mapping[str, float]) -> None:
+    """Note a component across the shaft that is `_ALONG` times the one along it: another axis, or another shaft."""
+    if not others:
+        return
+    most = max(others, key=lambda a: abs(others[a]))
+    if abs(others[most]) > _ALONG * abs(along):
+        factor = abs(others[most] / along) if along else math.inf
+        words = f"along {most}"
+        run.elsewhere.append(Elsewhere(CHANNEL[quantity], words, factor))
+        run.notes.append(
+            f"{quantity} along {axis} is {along:.4g}, {words} {others[most]:.4g}: --axis {most} if that is the shaft"
+        )
+
+
 def _stated_zones(run: OpenRun, quantity: str, pool: Mapping[str, LoadColumn], zones: Sequence[str]) -> list[str]:
     """Zones that the user names and a load has; a duct needs no torque."""
     torque, known, absent = quantity == "torque", [z for z in zones if z in pool], [z for z in zones if z not in pool]
@@ -373,7 +401,7 @@ def counted_zones(
         known = _stated_zones(run, quantity, pool, zones)
         shaft = [z for z in known if not (torque and z in ducts)]
         return [(1.0, z) for z in shaft or known], [z for z in known if z in ducts]
-    net = next((z for z in pool if z.lower() in _NET), None)
+    net = next((z for z in pool if z.lower() in NET), None)
     if net is not None:
         less = ducts if torque else []
         if less:

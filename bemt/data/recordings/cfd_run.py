@@ -6,6 +6,7 @@ Which column is which load: :mod:`bemt.data.recordings.cfd_loads`.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -20,10 +21,21 @@ from bemt.base.tables import number_of, number_text, text_table
 from bemt.data import readers
 from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import RunToml
-from bemt.data.readers.headings import channel_of
+from bemt.data.readers.headings import channel_of, meanings
 from bemt.data.recordings.cfd_files import EXPORT, PROGRAMS, Settled, cfd_files, clock_of, read_run, settled, zone_of
-from bemt.data.recordings.cfd_loads import CHANNEL, OpenRun, by_zone, columns_of, counted_zones, other_than_loads
-from bemt.data.recordings.cfd_setup import CfdRun, conditions_text, with_grid_floor
+from bemt.data.recordings.cfd_loads import (
+    CHANNEL,
+    NET,
+    LoadColumn,
+    OpenRun,
+    across,
+    by_zone,
+    columns_of,
+    counted_zones,
+    other_axes,
+    other_than_loads,
+)
+from bemt.data.recordings.cfd_setup import CfdRun, Elsewhere, conditions_text, with_grid_floor
 from bemt.data.recordings.channels import moves
 from bemt.data.recordings.check import check
 from bemt.data.recordings.grid_study import CELL_SIZE, COVERAGE, by_grid, groups, together
@@ -41,6 +53,7 @@ _GRIDS = frozenset(("cells", "cell_size"))
 _POINT = ("rpm", "airspeed_m_s", "density_kg_m3", "J")
 _KNOWN = frozenset((*_COEFFICIENTS, "KT", "KQ", "10KQ", "eta", "eta0", "FM", "time_s"))
 """Names of columns that say the loads once more."""
+_NAMED_LOAD = re.compile(r"force|thrust|torque|moment|lift|drag", re.IGNORECASE)
 _BESIDE = {"force.dat": "moment.dat", "moment.dat": "force.dat"}  # files that OpenFOAM writes beside each other
 
 
@@ -140,12 +153,37 @@ def _summed(work: OpenRun, quantity: str) -> dict[str, Settled]:
     if len(known) < len(means):
         return {}
     loads = {quantity: _sum([(k, known[z]) for k, z in counted])}
+    _beside(work, quantity, pool, counted, float(np.nanmean(loads[quantity].values)))
     if thrust and ducts and work.run.columns.duct_thrust is None:
         loads["duct_thrust"] = _sum([(1.0, known[z]) for z in ducts])
         work.notes.append(f"duct_thrust_N is that of {', '.join(ducts)}")
     if thrust and own != [""]:
         work.notes.append(f"thrust is that of {' + '.join(z or 'the whole' for z in own)}")
     return loads
+
+
+def _beside(
+    work: OpenRun, quantity: str, pool: Mapping[str, LoadColumn], counted: Sequence[tuple[float, str]], value: float
+) -> None:  # fmt: skip
+    """Keep what the files hold beside a load: zones that are not counted, components across the shaft."""
+
+    def mean(c: LoadColumn) -> float:
+        found = work.mean(quantity, c)
+        return math.nan if found is None else float(np.nanmean(found.values))
+
+    own = {z for _, z in counted}
+    single = {z for z in pool if z.lower() not in NET}
+    if quantity == "thrust":
+        work.zones = frozenset(own & single or single or own)
+        left = [z for z in pool if z in single - own] if own <= single else []
+        if left and value:
+            whole = value + sum(mean(pool[z]) for z in left)
+            work.elsewhere.append(Elsewhere(CHANNEL[quantity], f"with {' + '.join(left)}", abs(whole / value)))
+    axes: dict[str, float] = {}
+    for k, z in counted:
+        for c in other_axes(work, pool[z]):
+            axes[c.axis] = axes.get(c.axis, 0.0) + k * mean(c)
+    across(work, quantity, next(iter(pool.values())).axis, value, axes)
 
 
 def _grids(run: RunToml, folder: Path, name: str) -> CfdRun:
@@ -272,6 +310,14 @@ def _table(record: Dataset) -> bool:
 
 def _unused(work: OpenRun, values: Mapping[str, Array]) -> None:
     """Name columns that vary and became nothing: rows that differ in one of them only are no repeats."""
+    for quantity in ("thrust", "torque"):  # a column that no word but the user's made a load
+        told = work.fact(quantity).column
+        if told is not None and quantity not in meanings(told):
+            work.notes.append(f"{quantity} is {told}, as stated")
+    left = [c.name for c in work.columns if c.record.clock and not c.part and c.name not in work.used]
+    left = [n for n in left if channel_of(n) not in _KNOWN and not other_than_loads([n]) and _NAMED_LOAD.search(n)]
+    if left:
+        work.notes.insert(0, f"not used: {', '.join(dict.fromkeys(left))}; --column says what it is")
     rest = [c for c in work.columns if _table(c.record) and c.name not in work.used and moves(c.record[c.name])]
     rest = [c for c in rest if channel_of(c.stem) not in _KNOWN]
     if not rest:
@@ -333,13 +379,16 @@ def _dataset(work: OpenRun, points: _Points, read: Sequence[tuple[str, Dataset]]
     given = tuple(q for q in ("thrust", "torque") if (fact := getattr(work.run.columns, q)) and fact.unit)
     made = CfdRun("cfd", Path(name).name, full, {k: np.broadcast_to(v, (rows,)) for k, v in points.u.items()}, (),
                   about, labels, notes=tuple(dict.fromkeys(work.notes)), files=tuple(work.run.run.files),
-                  conditions=conditions, averaged=averaged, drift=drift, units_given=given)  # fmt: skip
+                  conditions=conditions, averaged=averaged, drift=drift, units_given=given, zones=work.zones,
+                  elsewhere=tuple(work.elsewhere))  # fmt: skip
     keep = np.any([np.isfinite(v) for k, v in full.items() if k not in _POINT], axis=0)
     if not keep.all():
         note = f"{number_of((~keep).sum(), 'point')} without a load left out"
         made = replace(made.select(keep), notes=(*made.notes, note))
         each = None if each is None else np.broadcast_to(each, (rows,))[keep]
-    slips = (f"{f.evidence}. Suggestion: {f.correction}" for f in check(made) if f.severity != "note")
+    found = () if work.elsewhere else check(made)  # what lies elsewhere is no slip of a unit
+    fluid = "" if "density_kg_m3" in full else "density, not stated and taken for that of air (--density-kg-m3), or "
+    slips = (f"{f.evidence}. Suggestion: {fluid}{f.correction}" for f in found if f.severity != "note")
     made = replace(made, notes=(*slips, *made.notes))
     if each is not None and np.unique(each).size > 1:
         return by_grid(made, each, None if "cells" in values else work.size_unit)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -105,9 +106,20 @@ def floor_note(some_fly: bool, all_fly: bool) -> str:
     return f"no grid study: at least {sizes} ({GRID_FLOOR_SOURCE})"
 
 
+class Elsewhere(NamedTuple):
+    """A load that the files hold and that does not count, as the user states zones and axis."""
+
+    channel: str
+    words: str  # Such as "with thrust-duct"
+    factor: float  # Load with it, or there, over what counts [1]
+
+
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class CfdRun(Dataset):
-    """Points of one CFD run, or of one condition on several grids: its files, how it was made, averaged and studied."""
+    """Points of one CFD run, or of one condition on several grids: its files, how it was made, averaged and studied.
+
+    ``zones`` are those whose forces are the thrust, without a sum that the file has of them.
+    """
 
     files: tuple[str, ...] = ()
     conditions: Mapping[str, Any] = field(default_factory=dict)  # As stated or read: cells, turbulence, domain, ...
@@ -115,6 +127,8 @@ class CfdRun(Dataset):
     drift: Mapping[str, float] = field(default_factory=dict)  # Over the averaged part, share of the mean [1]
     units_given: tuple[str, ...] = ()  # Loads whose unit the user stated
     studies: tuple[LoadStudy, ...] = ()
+    zones: frozenset[str] = frozenset()
+    elsewhere: tuple[Elsewhere, ...] = ()
 
     def document(self) -> dict[str, Any]:
         """Plain values."""
@@ -125,7 +139,7 @@ class CfdRun(Dataset):
         ]
         return {"name": self.file, "files": list(self.files), "points": points, "averaged": self.averaged,
                 "drift": self.drift, "conditions": self.conditions, "studies": [s.document() for s in self.studies],
-                "notes": list(self.notes)}  # fmt: skip
+                "zones": sorted(filter(None, self.zones)), "notes": list(self.notes)}  # fmt: skip
 
 
 def stated_of(d: Dataset) -> Mapping[str, Any]:
@@ -251,7 +265,7 @@ def references_of(run: Dataset, where: str) -> list[Reference]:
                 continue
             state = {k: float(run[k][i]) for k in ("rpm", "airspeed_m_s", "density_kg_m3") if k in run}
             out.append(Reference(
-                quantity, value, float(run.u[channel][i]), channel, "cfd", run.name, conditions_text(setup),
+                quantity, value, float(run.u[channel][i]), channel, "cfd", Path(run.name).name, conditions_text(setup),
                 f"{number_text(value, 4)} {unit}", where=f"{where}:{i + 1}", sha256=sha256, setup=setup, **state,
             ))  # fmt: skip
     return out

@@ -10,7 +10,9 @@ GCI21 = Fs |e21/f1| / (r21^p - 1) with Fs = 1.25 for three grids and 3.0 for two
 
 The index means something only when the values fall into line: `flags` name oscillation, divergence, an implausible
 order and small refinement ratios. Then `u_relative` no longer rests on the order but on the largest difference between
-the grids (factor 3, after Eca and Hoekstra).
+the grids (factor 3, after Eca and Hoekstra). Above the highest plausible order it goes over from the index at that
+order to the spread, linearly up to twice the order: that an excess over the formal order costs in proportion is Xing's
+and Stern's idea (J. Fluids Eng. 132(6), 061403, 2010; not checked against the paper), the ramp is ours.
 
 References
 ----------
@@ -26,6 +28,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -204,7 +207,12 @@ def grid_study(
     fine = fs * abs(e21 / f[0]) / factor
     coarse = fs * abs(e32 / f[1]) / (r[1] ** p - 1.0) if len(f) == 3 else None
     asymptotic = coarse / (r[0] ** p * fine) if coarse is not None and fine > 0.0 else None
-    u = max(fine, 3.0 * spread if flag and len(f) == 3 else 0.0) / COVERAGE
+    highest = ORDERS[1] * formal_order
+    if flag and len(f) == 3 and p > highest:  # no jump at the limit: the index there goes over into the spread
+        least, over = fs * abs(e21 / f[0]) / (r[0] ** highest - 1.0), min(p / highest - 1.0, 1.0)
+        u = (least + over * max(3.0 * spread - least, 0.0)) / COVERAGE
+    else:
+        u = max(fine, 3.0 * spread if flag and len(f) == 3 else 0.0) / COVERAGE
     return GridStudy(f, r, p, f[0] - e21 / factor, fine, coarse, asymptotic, fs, u, tuple(flags))
 
 
@@ -295,7 +303,8 @@ def by_grid(d: CfdRun, cells: Array, size_unit: str | None = None) -> CfdRun:
     values, u, grid = ({k: v[rows] for k, v in table.items()} for table in (d.values, random, sizes))
     labels = tuple(d.labels[i] for i in rows if d.labels)
     made = CfdRun("cfd", d.name, values, u, (), d.provenance, labels, notes=d.notes, files=d.files, conditions=told,
-                  averaged=d.averaged, drift=d.drift, units_given=d.units_given, studies=tuple(studies))  # fmt: skip
+                  averaged=d.averaged, drift=d.drift, units_given=d.units_given, studies=tuple(studies),
+                  zones=d.zones, elsewhere=d.elsewhere)  # fmt: skip
     return with_grid_floor(made, grid, tuple(s.sentence() for s in studies))
 
 
@@ -340,14 +349,47 @@ def together(parts: Sequence[Dataset], name: str = "") -> CfdRun:
         "file": name or " + ".join(d.name for d in parts),
         "sha256": "+".join(str(d.provenance.get("sha256", "")) for d in parts),
     }  # fmt: skip
-    notes = tuple(dict.fromkeys(t for d in parts for t in d.notes if "no grid study" not in t))
+    _one_study(runs, finest)
+    own = {_bare(t) for t in finest.notes}
+    notes = tuple(dict.fromkeys(t if d is finest else f"{Path(d.file or d.name).name}: {t}"
+                                for d in [finest, *(d for d in runs if d is not finest)] for t in d.notes
+                                if "no grid study" not in t and (d is finest or _bare(t) not in own)))  # fmt: skip
     joined = concat([replace(d, kind="cfd", u=d.u_by.get("random", d.u), u_by={}) for d in parts])
     name = name or f"{finest.name} and {len(parts) - 1} coarser"
     files = tuple(f for d in runs for f in d.files)
     whole = CfdRun("cfd", name, joined.values, joined.u, (), about, notes=notes, files=files,
                    conditions=finest.conditions, averaged=finest.averaged, drift=finest.drift,
-                   units_given=finest.units_given)  # fmt: skip
+                   units_given=finest.units_given, zones=finest.zones, elsewhere=finest.elsewhere)  # fmt: skip
     return by_grid(whole, np.repeat(cells, [len(d) for d in parts]))
+
+
+def _bare(note: str) -> str:
+    """A note without its numbers, which each grid has of its own."""
+    return re.sub(r"[-+.\d]+", "", note)
+
+
+def _one_study(runs: Sequence[CfdRun], finest: CfdRun) -> None:
+    """Refuse grids that have no condition in common with any other, or some of the zones of another only."""
+    names = [Path(d.file or d.name).name for d in runs]
+    faults = []
+    for k, d in enumerate(runs):
+        rest = [other for i, other in enumerate(runs) if i != k]
+        if not any(_alike_rows(d, i, other, j) for other in rest for i in range(len(d)) for j in range(len(other))):
+            others = "; ".join(dict.fromkeys(_state(o, 0) for o in rest))
+            hint = "A study is of one speed, airspeed and density"
+            faults.append(Fault(names[k], "", _state(d, 0), f"a condition of another grid ({others})", hint))
+    fine, finest_name = finest.zones, Path(finest.file or finest.name).name
+    for name, d in zip(names, runs, strict=True):
+        if d.zones & fine and d.zones != fine:
+            got, want = (" + ".join(sorted(zones)) for zones in (d.zones, fine))
+            hint = "Import it again with the same --zones"
+            faults.append(Fault(name, "zones", f"thrust of {got}", f"{want}, as {finest_name}", hint))
+    refuse(faults)
+
+
+def _alike_rows(a: Dataset, i: int, b: Dataset, k: int) -> bool:
+    both = {n: np.array([a[n][i], b[n][k]]) for n in _SAME if n in a and n in b}
+    return _alike(Dataset("cfd", "", both), 0, 1) if both else True
 
 
 def are_grids(parts: Sequence[Dataset]) -> bool:

@@ -227,7 +227,8 @@ class Imported:
         own = {name for run in self.runs for name in run.files}
         shown = [f for f in self.files if f.format != RUN and f.error is None]
         lines = [f.title if f.path in own else f.text + "\n" for f in shown]
-        lines += [cfd_run.run_text(run) + "\n" for run in self.runs]
+        grids = {name for run in self.runs if run.studies for name in run.files}  # told by their study
+        lines += [cfd_run.run_text(run) + "\n" for run in self.runs if run.file not in grids]
         if self.to_do and self.files:
             steps = "\n".join(f"  ! {line}" for line in self.to_do.splitlines())
             lines.append(f"To use it as a CFD run, and --out run.toml to keep it:\n{steps}\n")

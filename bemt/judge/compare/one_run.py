@@ -10,7 +10,7 @@ import os
 import re
 import shlex
 import textwrap
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of, number_text, speed_text, text_table
 from bemt.data.recordings.audit import AuditLine, combined
 from bemt.data.recordings.cfd_run import is_run, run_at
-from bemt.data.recordings.cfd_setup import audit_of, conditions_of, faults_first, floor_note, grid_floor
+from bemt.data.recordings.cfd_setup import Elsewhere, audit_of, conditions_of, faults_first, floor_note, grid_floor
 from bemt.data.recordings.channels import named
 from bemt.physics.dataset import Dataset
 from bemt.rotors.as_measured import FACTOR
@@ -44,6 +44,7 @@ _ROWS = 6  # points on one screen
 _WIDE = 2.0  # combined standard uncertainties within which nothing is shown to differ
 _NEAR_ZERO = 0.1  # share of the largest value of a load below which a difference has no per cent
 _FAR = 1.5  # ratio of the loads beyond which a slip is likelier than physics
+_NO_DENSITY = re.compile(r"density: not stated")
 _NAMES = {"program": "", "cells": "cells", "grid_level": "grid", "turbulence": "", "solver": "", "domain": "domain"}
 
 
@@ -145,7 +146,7 @@ def compare_run(
     name = os.fspath(path) if not isinstance(path, Dataset) else path.file or path.name
     made = rotor_of(case).case
     points, imported = cfd_points(name, given)
-    notes = list(points.notes)
+    notes, points_stated = list(points.notes), {*points.values}
     for channel, words, value in (
         ("rpm", "rev/min", made.rpm),
         ("airspeed_m_s", "m/s", made.airspeed_m_s),
@@ -194,7 +195,9 @@ def compare_run(
     return RunComparison(
         name, made.name, "cfd" if computed else "bench", {k: ", ".join(v) for k, v in conditions_of(imported).items()},
         out, tuple(faults_first(lines)), known, dict(imported.averaged) if is_run(imported) else {},
-        tuple(dict.fromkeys(notes)), _sentence(out, "CFD" if computed else "Recording", open_units(imported)),
+        tuple(dict.fromkeys(notes)),
+        _sentence(out, "CFD" if computed else "Recording", open_units(imported),
+                  imported.elsewhere if is_run(imported) else (), "density_kg_m3" not in points_stated),
         _next(out, lines, name, asked, whole.moved),
     )  # fmt: skip
 
@@ -242,7 +245,7 @@ def _verdict(E: float, u: float) -> str:
     return "agrees" if abs(E) <= u else "within 2 u" if abs(E) <= _WIDE * u else "differs"
 
 
-def _slip(name: str, loads: Sequence[BothLoads], unit_open: bool) -> tuple[float, str]:
+def _slip(name: str, loads: Sequence[BothLoads], unit_open: bool, density_open: bool = False) -> tuple[float, str]:
     """What a difference looks like that is no physics, and how little it fits; "" when nothing is near."""
     said = [load for load in loads if load.cfd and load.bemt and math.isfinite(load.u_both)]
     if not said:
@@ -260,7 +263,9 @@ def _slip(name: str, loads: Sequence[BothLoads], unit_open: bool) -> tuple[float
     near = [(e.rarity + float(np.mean(far**2)), e) for e in may
             if np.all((far := np.abs(np.log(off / e.factor)) / wide) < 1.0)]  # fmt: skip
     if not near:
-        return math.inf, f" First check {'unit, ' if unit_open else ''}sector, zones and speed."
+        return math.inf, (
+            f" First check {'unit, ' if unit_open else ''}{'density, ' if density_open else ''}sector, zones and speed."
+        )
     score, error = min(near, key=lambda item: item[0])
     size = max(error.factor, error.repair)
     return score, (f" {name.split('_')[0].capitalize()} is off by about a factor of {size:.4g}, as of {error.actual} "
@@ -275,7 +280,23 @@ def open_units(imported: Dataset) -> frozenset[str]:
     return frozenset(k for k in _KIND if k in imported.values and not re.search(r"[\[(].+[\])]", told.get(k, "")))
 
 
-def _sentence(points: Sequence[PointOfRun], who: str, units_open: Collection[str] = ()) -> str:
+def _not_counted(channel: str, loads: Sequence[BothLoads], elsewhere: Sequence[Elsewhere]) -> str:
+    """What the files hold beside a load that brings it nearer to the model by half or more; "" without it."""
+    ratio = [abs(load.cfd / load.bemt) for load in loads if load.cfd and load.bemt]
+    off = np.abs(np.log(ratio)) if ratio else np.zeros(1)
+    for e in elsewhere:
+        if e.channel == channel and 0.0 < e.factor < math.inf and ratio:
+            if float(np.median(np.abs(np.log(ratio) + math.log(e.factor)))) < 0.5 * float(np.median(off)):
+                value, unit = loads[0].cfd * e.factor, _LOADS[channel].split("[")[1].rstrip("]")
+                said, what = channel.split("_")[0].capitalize(), "axis" if e.words.startswith("along") else "zones"
+                return f" {said} {e.words} is {number_text(value, 4)} {unit}: check the {what}."
+    return ""
+
+
+def _sentence(
+    points: Sequence[PointOfRun], who: str, units_open: Collection[str] = (), elsewhere: Sequence[Elsewhere] = (),
+    density_open: bool = False,
+) -> str:  # fmt: skip
     every = [(k, load) for p in points for k, load in p.loads.items()]
     off = [(k, load) for k, load in every if load.verdict == "differs"]
     near = [(k, load) for k, load in every if load.verdict == "within 2 u"]
@@ -285,9 +306,13 @@ def _sentence(points: Sequence[PointOfRun], who: str, units_open: Collection[str
     agree = len(every) - len(off) - len(near) - lost
     if off:
         k, load = max(off, key=lambda x: x[1].times)
-        slips = [_slip(name, [v for n, v in every if n == name], name in units_open) for name in {n: 0 for n, _ in off}]
-        said = [slip for slip in slips if slip[1]]  # a unit explains all that differs, or nothing
-        tail += min(said, key=lambda slip: (math.isfinite(slip[0]), slip[0]))[1] if said else ""
+        loads = {name: [v for n, v in every if n == name] for name, _ in off}
+        if left := [words for name, own in loads.items() if (words := _not_counted(name, own, elsewhere))]:
+            tail += "".join(left)
+        else:
+            slips = [_slip(name, own, name in units_open, density_open) for name, own in loads.items()]
+            said = [slip for slip in slips if slip[1]]  # a unit explains all that differs, or nothing
+            tail += min(said, key=lambda slip: (math.isfinite(slip[0]), slip[0]))[1] if said else ""
         share = f" in {len(off)} of {len(every)} values" if len(every) > 1 else ""
         near_zero = abs(load.cfd) < _NEAR_ZERO * top[k]  # there the value is no measure of the difference
         share_of = f"{100.0 * load.difference / top[k]:+.0f} % of the largest" if near_zero else load.percent
@@ -364,6 +389,7 @@ def text(found: RunComparison, details: bool = False) -> str:
         lines.append(f"  ... {len(found.points) - len(shown)} more points (--details)")
     first = next(iter(found.points[0].loads.values()))
     parts = ", ".join(f"{k} {number_text(v, 2)}" for k, v in first.u_bemt_by.items())
+    lines.append(_filled(f"density {_span(p.density_kg_m3 for p in found.points)} kg/m3{_whose(found.notes)}", "  "))
     lines.append(f"  ±: one standard uncertainty; BEMT's in line 1: {parts}; in u: over both bands")
     for over in dict.fromkeys(found.averaged.values()):
         lines.append(f"  averaged: {', '.join(k for k, v in found.averaged.items() if v == over)}: {over}")
@@ -375,6 +401,18 @@ def text(found: RunComparison, details: bool = False) -> str:
     said.append("No cause is named from one point." if len(found.points) == 1 else "No cause is named here.")
     lines += ["", *map(_filled, [*said, f"Next: {found.next}"])]
     return "\n".join(lines)
+
+
+def _span(values: Iterable[float]) -> str:
+    """One number, or the lowest and the highest."""
+    own = list(values)
+    low, high = number_text(min(own), 4), number_text(max(own), 4)
+    return low if low == high else f"{low} to {high}"
+
+
+def _whose(notes: Collection[str]) -> str:
+    """That the density is the case's, where the recording states none."""
+    return ", of the case: the recording states none" if any(map(_NO_DENSITY.match, notes)) else ""
 
 
 def _set_up(told: Mapping[str, str]) -> str:

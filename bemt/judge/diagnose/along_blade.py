@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bemt.base import unit_errors
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError, refuse
+from bemt.base.errors import Fault, InputError
+from bemt.base.tables import number_text, speed_text
 from bemt.physics.air import Air
 from bemt.physics.bem import solver
 from bemt.physics.bem.model import Model, acts_on_points, acts_on_rotor
@@ -20,9 +22,9 @@ from bemt.physics.effects.base import Effect
 from bemt.rotors.case.prepare import prepare_case
 
 if TYPE_CHECKING:
+    from bemt.judge.diagnose.record import Record
     from bemt.rotors.case import Case
 
-COLUMNS = ("r_m", "thrust_per_radius_N_m", "torque_per_radius_Nm_m")
 # Root and tip are left out: hubs are not modelled, and what the last percents of a blade carry no two codes agree on.
 BANDS = np.linspace(0.40, 0.95, 6)
 # An effect explains when it leaves at most this share of the squared misfit; those within this factor of the best are
@@ -31,6 +33,8 @@ EXPLAINED, ALIKE = 0.3, 1.5
 # Loads that agree this well on the average need no explanation: grids of such CFD are no better. What the recording
 # states of its own uncertainty counts where it is larger.
 FINE = 0.10
+# Radius over the tip's up to which the slices of a rotor may reach; speeds that are one within this share.
+BEYOND, ONE = 1.05, 2e-3
 # What untwists under load is no rotor of CFD: its blades are rigid.
 RIGID = ("untwist",)
 
@@ -65,6 +69,8 @@ class AlongBlade:
     named: tuple[str, ...]  # Effects that explain and are not told apart; empty: none does, or nothing needs to
     # (2,) Difference of thrust and torque up to which nothing needs to be explained [1]
     fine: tuple[float, float] = (FINE, FINE)
+    state: str = ""  # Speed, airspeed and density of the comparison, and who says them
+    whole: str = ""  # That the slices do not add up to the recorded load
 
     @property
     def beyond(self) -> bool:
@@ -74,7 +80,9 @@ class AlongBlade:
     def text(self) -> str:
         """Lines for people."""
         rms = float(np.sqrt(np.mean(np.log(np.stack([self.thrust, self.torque])) ** 2)))
-        rows = [f"Along the blade the loads differ by {100 * rms:.0f} % on the average."]
+        state = f" {self.state}" if self.state else ""
+        rows = [f"Along the blade{state} the loads differ by {100 * rms:.0f} % on the average."]
+        rows += [f"  ! {self.whole}"] if self.whole else []
         for name, ratio in (("thrust", self.thrust), ("torque", self.torque)):
             cells = (f"{a:.2f}-{b:.2f} R {100 * (v - 1):+.0f} %"
                      for a, b, v in zip(self.bands[:-1], self.bands[1:], ratio, strict=True))  # fmt: skip
@@ -84,6 +92,8 @@ class AlongBlade:
             rows.append(
                 f"  {' or '.join(self.named)}: {best} leaves {100 * self.left[best]:.0f} % of the squared misfit."
             )
+        elif self.beyond and self.whole:
+            rows.append("  No cause is named from slices that do not add up to the recording.")
         elif self.beyond:
             rows.append("  No single effect explains it.")
         else:
@@ -95,54 +105,116 @@ class AlongBlade:
         """As JSON takes it."""
         return {"bands": self.bands.tolist(), "thrust_ratio": self.thrust.tolist(),
                 "torque_ratio": self.torque.tolist(), "left": self.left, "named": list(self.named),
-                "fine": list(self.fine)}  # fmt: skip
+                "fine": list(self.fine), "state": self.state, "whole": self.whole}  # fmt: skip
 
 
 def read_blade_loads(path: Path) -> dict[str, BladeLoads]:
-    """Read ``radial.csv`` of a campaign: columns run, r_m, thrust_per_radius_N_m, torque_per_radius_Nm_m.
+    """Read slices (`bemt.data.readers.slices`), as ``radial.csv`` of a campaign has them, by run.
 
-    Speeds, density and uncertainties of each run come from ``recording.csv`` beside it, where there is one.
+    Speeds, density and uncertainties that they do not state come from ``recording.csv`` beside it, where there is one.
     """
-    from bemt.data.readers import load_text, number
+    from bemt.data.readers import load_text, number, slices
 
-    rows = list(csv.DictReader(load_text(path).lines))
-    needed = ("run", *COLUMNS)
-    missing = [name for name in needed if rows and name not in rows[0]]
-    if missing or not rows:
-        got = f"no column {', '.join(missing)}" if rows else "no rows"
-        raise InputError(Fault(path.as_posix(), "", got, ", ".join(needed)))
-    faults = [Fault(path.as_posix(), f"{i}: {c}", repr(row[c]), "a number")
-              for i, row in enumerate(rows, 2) for c in COLUMNS if number(row[c] or "") is None]  # fmt: skip
-    refuse(faults)
-    runs = dict.fromkeys(str(row["run"]) for row in rows)
-    table = {run: np.array([[number(row[c]) for c in COLUMNS] for row in rows if row["run"] == run], float).T
-             for run in runs}  # fmt: skip
     beside = path.with_name("recording.csv")
     points = {row["run"]: row for row in csv.DictReader(load_text(beside).lines)} if beside.is_file() else {}
 
-    def made(run: str) -> BladeLoads:
+    def made(run: str, s: slices.Slices) -> BladeLoads:
         row = points.get(run, {})
 
         def of(name: str) -> float | None:
             return number(row.get(name) or "")
 
-        rpm, V, density = (of(c) for c in ("rpm", "airspeed_m_s", "density_kg_m3"))
-        shape = table[run][0], table[run][1], table[run][2]
+        rpm, V, density = (s.stated.get(c, of(c)) for c in ("rpm", "airspeed_m_s", "density_kg_m3"))
         thrust, torque = (abs((of(f"u_{c}") or 0.0) / (of(c) or np.inf)) for c in ("thrust_N", "torque_Nm"))
-        return BladeLoads(run, *shape, rpm, V, density, (thrust, torque))
+        return BladeLoads(run, s.r, s.thrust, s.torque, rpm, V, density, (thrust, torque))
 
-    return {run: made(run) for run in table}
+    return {run: made(run, s) for run, s in slices.read(path).items()}
 
 
-def along(case: Case, path: Path) -> dict[str, AlongBlade]:
-    """Compare every run of a file of radial loads with a case, at the run's own speeds or the case's."""
+@dataclass(frozen=True)
+class Stated:
+    """Speed [rev/min], airspeed [m/s] and density [kg/m3] at which slices are compared, and who says the speed."""
+
+    rpm: float
+    V: float
+    density: float | None  # None: that of the case
+    whose: str
+    loads: tuple[float, float] = (np.nan, np.nan)  # Thrust [N] and torque [N m] of the recording there
+
+
+def along(
+    case: Case, path: Path, recorded: Sequence[Record] = (), rpm: float | None = None, V: float | None = None
+) -> dict[str, AlongBlade]:  # fmt: skip
+    """Compare every run of a table of slices with a case.
+
+    Speed, airspeed and density are those that the slices state, else `rpm` and `V`, else those of the recordings, if
+    they have one condition, else the case's where nothing was recorded. InputError on recordings of several speeds, and
+    on slices beyond the tip or short of it.
+    """
     model = prepare_case(case)
     out = {}
     for run, loads in read_blade_loads(path).items():
-        air = case.air() if loads.density is None else Air.from_density(loads.density)
-        rpm = case.rpm if loads.rpm is None else loads.rpm
-        out[run] = compare_along(model, loads, rpm, case.airspeed_m_s if loads.V is None else loads.V, air)
+        _within(model.rotor.R, loads.r, path, run)
+        at = _condition(case, loads, recorded, rpm, V, path)
+        air = case.air() if at.density is None else Air.from_density(at.density)
+        told = compare_along(model, loads, at.rpm, at.V, air)
+        state = f"at {speed_text(at.rpm)} rev/min, {number_text(at.V, 4)} m/s, {number_text(float(air.rho), 4)} kg/m3"
+        whole = _whole(loads, at, case.ducted)  # what is not the recording explains nothing of it
+        named = () if whole else told.named
+        out[run] = replace(told, state=f"{state} (speed {at.whose})", whole=whole, named=named)
     return out
+
+
+def _within(R: float, r: Array, path: Path, run: str) -> None:
+    """Refuse radii beyond the tip, or short of every band: they are in another unit."""
+    top = float(r.max()) / R
+    if BANDS[0] < top <= BEYOND:
+        return
+    near = [e for e in unit_errors.errors("length") if BANDS[-2] < top * e.repair <= BEYOND and e.stated == "m"]
+    hint = f"{near[0].actual} in a column of {near[0].stated}?" if near else "Slices reach from the root to the tip"
+    got = f"radii of run {run} up to {r.max():.4g} m, {top:.4g} R"
+    raise InputError(Fault(path.as_posix(), "radius", got, f"slices up to about the tip, {R:.4g} m", hint))
+
+
+def _condition(
+    case: Case, loads: BladeLoads, recorded: Sequence[Record], rpm: float | None, V: float | None, path: Path
+) -> Stated:  # fmt: skip
+    """Where slices are compared: as they state, as the options say, as the one condition that was recorded is."""
+    own = [r for r in recorded if not r.reference]
+    n, v = (np.concatenate([np.empty(0), *x]) for x in ([r.rpm for r in own], [r.V for r in own]))
+    rho = np.concatenate([np.empty(0), *(np.broadcast_to(r.air.rho, r.rpm.shape) for r in own)])
+    speed, whose = (loads.rpm, "of the slices") if loads.rpm is not None else (rpm, "as --rpm says")
+    wind = V if loads.V is None else loads.V
+    here = np.ones(n.size, dtype=bool) if speed is None else np.abs(n / speed - 1.0) < ONE
+    here &= np.ones(n.size, dtype=bool) if wind is None else np.abs(v - wind) < np.maximum(0.02, ONE * abs(wind))
+    one = here.any() and np.ptp(n[here]) < ONE * n[here].max() and np.ptp(v[here]) < max(0.02, ONE * v[here].max())
+    if n.size and speed is None and not one:
+        got = f"slices without a speed, and {n.size} readings at {n.min():g} to {n.max():g} rev/min"
+        got += f", {v.min():g} to {v.max():g} m/s"
+        raise InputError(Fault(path.as_posix(), "rpm", got, "the speed of the slices", "A column rpm, or --rpm N"))
+    if not one:
+        speed, whose = (case.rpm, "of the case") if speed is None else (speed, whose)
+        return Stated(speed, case.airspeed_m_s if wind is None else wind, loads.density, whose)
+    measured: list[float] = []
+    for name in ("thrust_N", "torque_Nm"):
+        every = [r.measured.get(name, np.full(len(r), np.nan)) for r in own]
+        found = np.concatenate(every)[here]
+        measured.append(float(np.nanmean(found)) if np.isfinite(found).any() else np.nan)
+    density = float(np.mean(rho[here])) if loads.density is None else loads.density
+    whose = "of the recording" if speed is None else whose
+    speed = float(np.mean(n[here])) if speed is None else speed
+    return Stated(speed, float(np.mean(v[here])) if wind is None else wind, density, whose, (measured[0], measured[1]))
+
+
+def _whole(loads: BladeLoads, at: Stated, ducted: bool) -> str:
+    """What slices add up to, where that is not what the recording has; a duct carries a thrust of its own."""
+    said = []
+    both = (("thrust", "N", loads.thrust, at.loads[0]), ("torque", "N m", loads.torque, at.loads[1]))
+    for name, unit, per, whole in both:
+        total = float(np.trapezoid(per, loads.r))
+        if np.isfinite(whole) and whole and abs(total / whole - 1.0) > FINE and not (ducted and name == "thrust"):
+            said.append(f"{number_text(total, 4)} {unit} of {name} (recorded: {number_text(whole, 4)})")
+    return f"The slices add up to {' and '.join(said)}: are they of all blades, at this speed?" if said else ""
 
 
 def compare_along(model: Model, loads: BladeLoads, rpm: float, V: float, air: Air) -> AlongBlade:

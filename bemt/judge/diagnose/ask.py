@@ -200,7 +200,8 @@ def diagnosed(
     })  # fmt: skip
     asked = Given(_quoted(files, "RECORDING"), _quoted(known, "REFERENCE"), rest, tuple(ruled_out), tuple(changed))
     heard = [CHANNELS[c] for c in channels] or None
-    blade = {} if along is None else along_blade(cases[0], Path(path_text("along", along)))
+    one = [v[0] if len(v) == 1 else None for v in (speeds, winds)]
+    blade = {} if along is None else along_blade(cases[0], Path(path_text("along", along)), records, *one)
     beside = {"along_blade": {run: c.document() for run, c in blade.items()}} if blade else {}
     try:
         answer = diagnose(records, each, only or None, progress, baseline=baseline, given=asked, channels=heard)

@@ -7,7 +7,7 @@ those of `bemt.rotors.case.propagate`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
@@ -187,8 +187,7 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
         case.name, case.title, case.kind, case.file.origin, __version__,
         rows=(*rows, *(r for r in beside if r.source in ROW_SOURCES)), variants=tuple(variants),
         other_rows=tuple(r for r in beside if r.source not in ROW_SOURCES), comparisons=tuple(comparisons),
-        audit=tuple(_audit(r, setup, ready, case.ducted)
-                    for r, (*_, setup) in zip(beside, recorded, strict=True) if r.source == "cfd"),
+        audit=_audits(recorded, beside, ready, case.ducted),
         grid_studies=_studies(computed),
         conditions=_description(case, ready, case.file.model.stations),
         assumptions=tuple(map(_assumption, found.moved)),
@@ -225,7 +224,8 @@ def _recorded_rows(
             u = {k: float(full.u[k][i]) for k in full.values}
             first = known_by[full.labels[i]]
             known = {k: get.get(k, math.nan) for k in (*COMPARED, "rpm", "airspeed_m_s", "density_kg_m3")}
-            row = _row(group.kind, f"{group.kind} {first.printed}", known.pop("thrust_N"), **known,
+            file = f" {first.source}" if first.setup else ""  # a CFD run
+            row = _row(group.kind, f"{group.kind}{file} {first.printed}", known.pop("thrust_N"), **known,
                        M_tip=nominal.M_tip[at], Re=nominal.Re75[at], u=u.get("thrust_N", math.nan),
                        origin=str(full.provenance.get("source", "")),
                        remark=str(full.provenance.get("remark", "")))  # fmt: skip
@@ -251,6 +251,24 @@ def _comparisons(recorded: list[Recorded], models: Mapping[str, Dataset]) -> tup
                             errors |= {f"{name}_error_pct": line.E_pct, f"{name}_u_val": line.u_val}
         rows.append(replace(row, **errors))
     return rows, out
+
+
+def _audits(
+    recorded: Sequence[Recorded], rows: Sequence[Row], ready: Model | PairModel, ducted: bool
+) -> tuple[Audit, ...]:  # fmt: skip
+    """Audit of every recorded CFD value; points of one run that say the same are told once, by its file."""
+    out: dict[tuple[str, ...], Audit] = {}
+    for row, (*_, setup) in zip(rows, recorded, strict=True):
+        if row.source == "cfd":
+            found = _audit(row, setup, ready, ducted)
+            file = f"{row.source} {row.origin}"
+            key = (file, *(f"{line.topic} {line.status}" for line in found.lines)) if setup else (str(len(out)),)
+            out.setdefault(key, replace(found, reference=file) if setup and not _named(out.values(), file) else found)
+    return tuple(out.values())
+
+
+def _named(audits: Iterable[Audit], reference: str) -> bool:
+    return any(a.reference == reference for a in audits)
 
 
 def _audit(row: Row, setup: Mapping[str, Any], ready: Model | PairModel, ducted: bool) -> Audit:

@@ -347,7 +347,8 @@ class Result(Documented):
 
     def audit_of(self, reference: str) -> Audit | None:
         """Audit of one recorded value."""
-        return next((a for a in self.audit if a.reference == reference), None)
+        own = [a for a in self.audit if f"{reference} ".startswith(f"{a.reference} ")]  # of it, or of all of its file
+        return max(own, key=lambda a: len(a.reference), default=None)
 
 
 class Sweep(Documented):

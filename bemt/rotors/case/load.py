@@ -183,13 +183,18 @@ class Case:
     def run_paths(self) -> tuple[Path, ...]:
         """CFD runs in the folder of the case: recorded values like those of the references.
 
-        ``run*.toml``, and ``study*.toml`` in place of the runs that they name.
+        Files that ``bemt import --out`` writes, by what is in them; a study stands in place of the runs that it names.
         """
         if not self.path.is_file():
             return ()
-        studies = sorted(self.folder.glob("study*.toml"))
-        named = {path.resolve() for study in studies for path in _exports(study)}
-        return (*(p for p in sorted(self.folder.glob("run*.toml")) if p.resolve() not in named), *studies)
+        others = [p for p in sorted(self.folder.glob("*.toml")) if p != self.path]
+        if not others:
+            return ()
+        from bemt.data.readers.cfd_run import sniff
+
+        runs = [p for p in others if sniff(p.read_bytes()[:4096])]
+        named = {path.resolve() for run in runs for path in _exports(run)}
+        return tuple(p for p in runs if p.resolve() not in named)
 
     @property
     def diameter_m(self) -> float:

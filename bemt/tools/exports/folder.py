@@ -28,9 +28,10 @@ from geometry.mesh import Options
 
 
 class SolidPart(Documented):
-    """Named part of a solid."""
+    """Named part of a solid, and its size in words where the shape is ours to choose."""
 
     name: str
+    extent: str = ""
 
 
 class Listed(Documented):
@@ -311,7 +312,7 @@ def _unused(given: Mapping[str, Any], formats: Sequence[str], hold: tuple[str, .
     for key, value in given.items():
         if key not in used:
             readers = [name for name, target in exports().items() if key in target.uses]
-            hint = f"Formats that read it: {', '.join(readers) or 'none here'}"
+            hint = f"Formats that read it: {', '.join(readers) or 'none here'}; else leave it out"
             faults.append(Fault("", _option(key), shown(value).strip("'"), wanted, hint))
     if hold and all(exports()[name].kind == "solid" for name in formats):
         wanted = "a format of loads, disks or blades"
@@ -386,6 +387,7 @@ def text(manifest: Manifest, out: Path) -> str:
     else:
         words.append(f"thinnest section {number_text(checks.min_section_thickness * 1e3)} mm")
     lines.append(", ".join(words))
+    lines += [f"{f.path}: {s.extent}" for f in told.files for s in f.surfaces if s.extent]
     lines += printed_text(told.printed) if told.printed is not None else []
     for word in told.parts:
         if word in exports():

@@ -10,6 +10,7 @@ EXPORTS = {
     "step": "bemt.tools.exports.printing:StepExport",
     "3mf": "bemt.tools.exports.printing:ThreeMfExport",
     "flow": "bemt.tools.exports.printing:FlowExport",
+    "zone": "bemt.tools.exports.printing:ZoneExport",
     "px4": "bemt.tools.exports.autopilots:Px4Export",
     "ardupilot": "bemt.tools.exports.autopilots:ArdupilotExport",
     "xrotor": "bemt.tools.exports.design_codes:XrotorExport",

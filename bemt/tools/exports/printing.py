@@ -255,3 +255,11 @@ class FlowExport(SolidExport):
     id = "flow"
     title = "STEP of the air around, boundaries named"
     source = "geometry.cad.flow_domain; read by gmsh with Geometry.OCCImportLabels"
+
+
+class ZoneExport(SolidExport):
+    """A cylinder round the rotor for a rotating zone: MRF, sliding mesh."""
+
+    id = "zone"
+    title = "STEP and STL of the zone that turns, faces named"
+    source = "geometry.cad.rotating_zone"

@@ -1,0 +1,137 @@
+r"""Loads along the blade, as a table of slices: radius, thrust and torque per radius of all blades together.
+
+Headings state their units, by the vocabulary of any recording: ``r [mm],dT/dr [N/m],dQ/dr [N m/m]``,
+``radius_mm,thrust_per_radius_N_m,torque_per_radius_Nm_m``. A column ``run`` (or ``case``) keeps several runs apart;
+rpm, airspeed and density of the slices may stand beside them, as in any table.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemt.base import units
+from bemt.base.arrays import Array
+from bemt.base.errors import Fault, InputError, refuse
+from bemt.data.readers import load_text, number
+from bemt.data.readers.cfd import unit_of
+from bemt.data.readers.headings import channel_of, heading
+from bemt.data.readers.split import decimal_mark, some, split_table
+
+LOADS = {"thrust": "force", "torque": "torque"}
+_RADIUS = re.compile(r"r|rad|radius|radial[_ ](position|coordinate|distance)", re.IGNORECASE)
+_PER = re.compile(
+    r"d(?P<letter>[TFQM])[ _]?[/_]?[ _]?dr|(?P<words>[a-z]+(?:[_ ]force)?)[_ ](?:per|over|/)[_ ](?:unit[_ ])?"
+    r"(?:radius|length|span|metre|meter|m|r)",
+    re.IGNORECASE,
+)
+_LETTER = {"t": "thrust", "f": "thrust", "q": "torque", "m": "torque"}
+_UNIT = re.compile(r"(.*?)\s*[\[(]([^\[\]()]*)[\])]\s*")
+_EXAMPLE = "r [m], dT/dr [N/m], dQ/dr [N m/m]: loads of all blades together"
+
+
+@dataclass(frozen=True, eq=False)
+class Slices:
+    """Slices of one run: radius [m], thrust [N/m] and torque [N m/m] per radius, (N,) each, and what they state."""
+
+    r: Array
+    thrust: Array
+    torque: Array
+    stated: Mapping[str, float]  # rpm, airspeed_m_s, density_kg_m3, as far as columns have them
+
+
+def slice_heading(text: str) -> tuple[str, float] | str:
+    """Quantity of a heading of slices and its factor to SI; a text says what is wrong; "" for any other column.
+
+    >>> slice_heading("r [mm]"), slice_heading("dT/dr [N/m]"), slice_heading("torque_per_radius_Nm_m")
+    (('r', 0.001), ('thrust', 1.0), ('torque', 1.0))
+    >>> slice_heading("dQ/dr [N m/m]"), slice_heading("dQ/dr (N)"), slice_heading("chord [mm]")
+    (('torque', 1.0), ('torque', 1.0), '')
+    >>> slice_heading("dT/dr"), slice_heading("dT/dr [N]")
+    ('no unit', "'N' is no force per length")
+    """
+    found = _UNIT.fullmatch(text.strip())
+    base, stated = (found[1], found[2].strip()) if found else (text.strip(), "")
+    if (per := _PER.match(base)) and (found or base[per.end() :].startswith("_") or per.end() == len(base)):
+        quantity = _LETTER.get((per["letter"] or "").lower()) or channel_of(per["words"] or "").lower()
+        quantity = {"force": "thrust", "lift": "thrust", "moment": "torque"}.get(quantity, quantity)
+        if quantity not in LOADS:
+            return ""
+        stated = stated or base[per.end() :].strip("_")
+        if not stated:
+            return "no unit"
+        factor = _per_length(LOADS[quantity], stated)
+        return (quantity, factor) if factor else f"{stated!r} is no {LOADS[quantity]} per length"
+    own = heading(text)
+    name = base if found else units.split_suffix(base)[0]
+    if _RADIUS.fullmatch(name):
+        if own.unit is None or own.unit.dimension != "length":
+            return "no unit" if not stated else f"{stated!r} is no length"
+        return "r", own.unit.factor
+    return ""
+
+
+def _per_length(dimension: str, text: str) -> float:
+    """Factor to SI of a unit of a load per length; 0 for any other."""
+    for found in re.finditer(r"[/_ ]+", text):
+        load, length = unit_of(text[: found.start()]), unit_of(re.sub(r"\^?-1$", "", text[found.end() :]))
+        if load and length and (load.dimension, length.dimension) == (dimension, "length"):
+            return load.factor / length.factor
+    whole = unit_of(text)  # a torque per length is a force
+    return whole.factor if whole and dimension == "torque" and whole.dimension == "force" else 0.0
+
+
+def read(path: str | os.PathLike[str]) -> dict[str, Slices]:
+    """Slices of each run in a table; one without a column ``run`` is one run, named "slices"."""
+    name = os.fspath(path)
+    table = split_table(load_text(path))
+    comma = decimal_mark(table) == ","
+    heads = [h.strip() for h in table.headings]
+    faults: list[Fault] = []
+    at: dict[str, tuple[int, float]] = {}
+    for k, h in enumerate(heads):
+        meant = slice_heading(h)
+        if isinstance(meant, tuple):
+            at.setdefault(meant[0], (k, meant[1]))
+        elif meant:
+            faults.append(Fault(name, h, meant, "a unit", f"As in {_EXAMPLE}"))
+    if not faults and (missing := [q for q in ("r", *LOADS) if q not in at]):
+        words = {"r": "radius", "thrust": "thrust_per_radius_N_m", "torque": "torque_per_radius_Nm_m"}
+        got = f"columns {some(heads, 8)}: no {', '.join(words[q] for q in missing)}"
+        faults.append(Fault(name, "", got, _EXAMPLE))
+    refuse(faults)
+    state: dict[str, tuple[int, float]] = {}
+    for k, h in enumerate(heads):
+        quantity, unit = channel_of(h), heading(h).unit
+        if quantity in ("rpm", "airspeed_m_s", "density_kg_m3") and unit is not None:
+            state.setdefault(quantity, (k, 1.0 if unit.suffix == "rpm" else unit.factor))
+    label = next((k for k, h in enumerate(heads) if h.lower() in ("run", "case", "name", "design point")), None)
+    rows: dict[str, list[list[float]]] = {}
+    wanted = {**at, **state}
+    for line, cells in zip(table.lines, table.rows, strict=True):
+        texts = [cells[k].strip() if k < len(cells) else "" for k, _ in wanted.values()]
+        values = [number(t.replace(",", ".") if comma else t) for t in texts]
+        faults += [Fault(name, f"{line}: {heads[k]}", repr(t), "a number")
+                   for (k, _), t, v in zip(wanted.values(), texts, values, strict=True) if v is None]  # fmt: skip
+        run = "slices" if label is None else cells[label].strip()
+        rows.setdefault(run, []).append([(v or 0.0) * f for v, (_, f) in zip(values, wanted.values(), strict=True)])
+    if not rows:
+        faults.append(Fault(name, "", "no rows", "one slice a row"))
+    refuse(faults)
+    return {run: _slices(name, run, [*wanted], np.array(body).T) for run, body in rows.items()}
+
+
+def _slices(file: str, run: str, names: list[str], values: Array) -> Slices:
+    """One run, by radius."""
+    v = dict(zip(names, values[:, np.argsort(values[names.index("r")], kind="stable")], strict=True))
+    stated = {}
+    for key in v.keys() - {"r", *LOADS}:
+        if np.ptp(v[key]) > 1e-3 * abs(float(v[key][0])):
+            got = f"{', '.join(f'{x:g}' for x in np.unique(v[key])[:4])} in run {run}"
+            raise InputError(Fault(file, key, got, "one value in each run", "A column run keeps the runs apart"))
+        stated[key] = float(v[key][0])
+    return Slices(v["r"], v["thrust"], v["torque"], stated)
