@@ -310,7 +310,9 @@ def test_a_case_is_called_as_the_user_called_it(here: Path, capsys: pytest.Captu
     own = load_case(here / "my12x6")
     assert (own.name, own.diameter_m) == ("my12x6", pytest.approx(12 * 0.0254))
     assert main(["sweep", "my12x6", "--quiet"]) == 0
-    with pytest.raises(InputError, match="her12x6: got no folder or case of this name; expected a case, or a label: 12x6"):
+    with pytest.raises(
+        InputError, match="her12x6: got no folder or case of this name; expected a case, or a label: 12x6"
+    ):
         bemt.diagnose("blade.csv", "her12x6")
 
 

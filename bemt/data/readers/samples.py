@@ -241,9 +241,7 @@ def stuck(name: str, values: Mapping[str, Array]) -> NDArray[np.bool_]:
         readings = bool(np.any(steps <= NEAR * seen[1:]))
         one_speed = np.abs(rpm[rows, None] / rpm[rows] - 1.0) <= NEAR
         scaled = [load / rpm**2 for load in loads]
-        moves = [
-            np.any(one_speed & (np.abs(k[rows, None] - k[rows]) > MOVES * np.nanmax(np.abs(k)))) for k in scaled
-        ]
+        moves = [np.any(one_speed & (np.abs(k[rows, None] - k[rows]) > MOVES * np.nanmax(np.abs(k)))) for k in scaled]
     else:
         readings = abs(float(v[rows.start])) >= DIGITS * _last_digit(seen, steps)
         flow = values.get("airspeed_m_s", np.zeros(v.size))

@@ -133,9 +133,13 @@ def read_stations(path: Path, R: float) -> BladeStations:
     top = table.headings_line
     found = [column for j, text in enumerate(table.headings) if (column := _column(j, text, R))]
     told = []
-    if not any(column.name in ("beta", "pitch") for column in found):  # beside r and chord one angle is that of the blade
+    if not any(
+        column.name in ("beta", "pitch") for column in found
+    ):  # beside r and chord one angle is that of the blade
         bare = [(j, h) for j, h in enumerate(table.headings) if _ANGLE.search(plain(h))]
-        angles = [c for j, h in bare if (c := _column(j, _ANGLE.sub("blade angle", plain(h)), R))] if len(bare) == 1 else []
+        angles = (
+            [c for j, h in bare if (c := _column(j, _ANGLE.sub("blade angle", plain(h)), R))] if len(bare) == 1 else []
+        )
         told = [f"column {bare[0][1]!r} read as beta_deg, the angle to the plane of rotation" for _ in angles]
         found += angles
     by_name = {name: [c for c in found if c.name == name] for name in _HEADS}

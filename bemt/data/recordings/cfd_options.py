@@ -9,8 +9,8 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bemt.base.action import did_you_mean
 from bemt.base import units
+from bemt.base.action import did_you_mean
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.tables import write_atomic
 from bemt.base.toml import validated

@@ -154,7 +154,9 @@ def sticks(facts: Facts) -> Iterator[Finding]:
                 for k in (*STICKS, "rpm")
                 if k != name and k in facts.values and _varies(facts.values[k][whole])
             ]
-            text = f"{facts.values[name][rows[0]]:.6g} to the last digit in {whole.size} rows ({where_of(facts, whole)}) "
+            text = (
+                f"{facts.values[name][rows[0]]:.6g} to the last digit in {whole.size} rows ({where_of(facts, whole)}) "
+            )
             text += f"while {' and '.join(changes)}"
             left = "those rows" if name == "airspeed_m_s" else "those readings"
             fix = f"is the sensor stuck? Measure these points again; {left} are left out, all but the first"
