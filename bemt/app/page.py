@@ -29,7 +29,7 @@ def own(text: str) -> Path | None:
 
 
 def made(label: str, chord: float, pitch: float, diameter_in: float = 0.0) -> bemt.Propeller:
-    """Propeller of a case, stations or a label, whose chord over radius (0: none) and share of pitch are as measured."""
+    """Propeller of a case, stations or a label, whose chord over radius (0: no) and share of pitch are as measured."""
     path = own(label)
     if path is not None:
         case = path.is_dir() or path.suffix == ".toml"
