@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from diagnosing import CASES, case, points, recording
 
+import bemt
 from bemt.app.cli import main, parsed
 from bemt.base.errors import InputError
 from bemt.judge.diagnose import assemble, chain, document, record, suggest
@@ -559,3 +560,24 @@ def test_the_headline_claims_what_the_verdict_claims_and_a_study_of_cfd_ends_in_
     assert document.headline(replace(silent, said=claim)).startswith("The cause is")
     assert "finer grid" in suggest.suggest(silent.found, []).text
     assert "reference" not in silent.next.text + str(silent.next.otherwise)
+
+
+def test_the_improved_case_of_a_label_is_that_of_the_label(tmp_path: Path) -> None:
+    rotor = bemt.propeller("10x5")
+    rpm, J = np.repeat([5000.0, 10000.0, 15000.0], 6), np.tile(np.linspace(0.0, 0.5, 6), 3)
+    steep = rotor.case.get("blade.beta_offset_deg") + 1.5
+    turned = rotor.replaced({"blade.beta_offset_deg": steep}).solve(rpm, J=J, bands=False)
+    found = bemt.diagnose(turned, "10x5", reference=rotor.solve(rpm, J=J, bands=False),
+                          only=["pitch_offset", "torque_gain"], out=tmp_path / "out", figures=False)  # fmt: skip
+    assert found.verdict == "named"
+    assert "pitch_offset" in [e.id for e in prepare_case(load_case(tmp_path / "out")).effects]
+
+
+def test_a_unit_that_is_named_is_stated_next(tmp_path: Path) -> None:
+    """The next command is not the same again: it keeps the unit beside the table, and diagnoses that."""
+    rows = bemt.propeller("12x6").solve(np.linspace(3000, 6000, 7), bands=False)
+    table = "\n".join(f"{n:.0f},{T:.4f},{100 * Q:.5f}" for n, T, Q in
+                      zip(rows.rpm, rows.thrust_N, rows.torque_Nm, strict=True))  # fmt: skip
+    (tmp_path / "log.csv").write_text(f"rpm,thrust N,torque N m\n{table}\n")
+    text, kept = bemt.diagnose(tmp_path / "log.csv", "12x6").text, (tmp_path / "recording.toml").as_posix()
+    assert f"--unit torque=Ncm --out {kept}" in text and f"bemt diagnose {kept} --case 12x6" in text

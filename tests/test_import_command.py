@@ -277,3 +277,45 @@ def test_a_table_of_coefficients_is_shown_row_by_row(tmp_path: Path) -> None:
     file.write_text("rpm;CT;CP\n3000;0,0951;0,0420\n4000;0,0958;0,0415\n")
     told = bemt.import_(file).text
     assert all(number in told for number in ("0.0951", "0.0415", "4000"))
+
+
+TUNNEL = [(3006, 0, 2.50, 0.0516), (2998, 2.98, 2.16, 0.0514), (2999, 5.96, 1.56, 0.0454), (2999, 7.99, 0.89, 0.0340),
+          (2999, 10.02, 0.18, 0.0199), (3999, 0, 4.56, 0.0929), (4002, 2.97, 4.08, 0.0960), (4008, 5.99, 3.33, 0.0914),
+          (3996, 7.99, 2.69, 0.0810), (4000, 10.03, 1.83, 0.0681), (4995, 0, 6.98, 0.1422), (5004, 2.98, 6.49, 0.1487),
+          (5000, 6.07, 5.77, 0.1457), (5006, 7.99, 4.96, 0.1393), (5003, 9.99, 4.13, 0.1264)]  # fmt: skip
+
+
+def _tunnel(file: Path, rows: list[tuple[float, ...]]) -> dict[str, Any]:
+    """What import says of a table of a tunnel."""
+    head = "rpm,airspeed m/s,thrust N,torque N m\n"
+    file.write_text(head + "\n".join(",".join(map(str, row)) for row in rows))
+    return bemt.import_(file).to_dict()["files"][0]
+
+
+def test_a_sensor_that_sticks_in_part_of_a_table_is_named_and_hides_no_slip_of_a_unit(tmp_path: Path) -> None:
+    """Its rows are no repeats; typed set points and good readings are no fault; a unit is judged without three at rest."""
+    stuck = [row if i < 10 else (row[0], 10.03, *row[2:]) for i, row in enumerate(TUNNEL)]
+    both = [(n, V, T, round(100 * Q, 3)) for n, V, T, Q in stuck]
+    cell = [row if i < 10 else (row[0], row[1], 6.98, row[3]) for i, row in enumerate(TUNNEL)]
+    typed = [(n, round(V / 2) * 2, T, Q) for n, V, T, Q in TUNNEL]
+    one_V = [(n, 8.0, T, Q) for n, V, T, Q in TUNNEL if round(V) == 8] * 3
+    told = {name: _tunnel(tmp_path / f"{name}.csv", rows) for name, rows in
+            (("sound", TUNNEL), ("stuck", stuck), ("both", both), ("cell", cell), ("typed", typed), ("one", one_V))}  # fmt: skip
+    found = {name: {f["id"]: f for f in one["findings"]} for name, one in told.items()}
+    assert all(not found[name] for name in ("sound", "typed", "one"))
+    assert found["stuck"].keys() == {"stuck_sensor"} and found["stuck"]["stuck_sensor"]["rows"] == (10, 11, 12, 13, 14)
+    assert found["cell"]["stuck_sensor"]["channel"] == "thrust_N"
+    assert found["both"].keys() == {"stuck_sensor", "torque_unit"}
+    assert "Ncm taken for Nm" in found["both"]["torque_unit"]["correction"]
+    assert len(told["stuck"]["reduction"]["points"]) == 10
+    assert not any("repeats scatter" in note for note in told["stuck"]["reduction"]["notes"])
+
+
+def test_the_air_alone_makes_a_recording(tmp_path: Path) -> None:
+    """Headings that say all need no [columns]: [air] gives the density for coefficients."""
+    _tunnel(tmp_path / "good.csv", TUNNEL)
+    (tmp_path / "good.toml").write_text('[recording]\nfile = "good.csv"\n[air]\ndensity_kg_m3 = 1.19\n')
+    read = bemt.read(tmp_path / "good.toml").derive(0.3048)
+    assert read["CT"][0] == pytest.approx(2.50 / (1.19 * 50.1**2 * 0.3048**4), rel=1e-3)
+    with pytest.raises(bemt.InputError, match="density_kg_m3"):
+        bemt.read(tmp_path / "good.csv").plot("rpm", ["CT", "CP"])

@@ -302,3 +302,24 @@ def test_a_ratio_just_above_one_is_no_per_cent(tmp_path: Path) -> None:
             load_case(file)
         (fault,) = [f for f in caught.value.faults if f.where == "rotor.hub_ratio"]
         assert hint in fault.hint and ("percent" in fault.hint) == bool(hint)
+
+
+def test_a_case_is_called_as_the_user_called_it(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A name with a size in it is a name: the folder has it, and without one nothing is taken for the label."""
+    assert main(["new", "my12x6", "--stations", "blade.csv"]) == 0
+    own = load_case(here / "my12x6")
+    assert (own.name, own.diameter_m) == ("my12x6", pytest.approx(12 * 0.0254))
+    assert main(["sweep", "my12x6", "--quiet"]) == 0
+    with pytest.raises(
+        InputError, match="her12x6: got no folder or case of this name; expected a case, or a label: 12x6"
+    ):
+        bemt.diagnose("blade.csv", "her12x6")
+
+
+@pytest.mark.parametrize("head", ["r/R,chord mm,angle deg", "r_over_R,chord_mm,angle_deg", "r/R,c [mm],Angle (deg)"])
+def test_the_one_angle_of_a_blade_is_its_blade_angle(head: str, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (here / "b.csv").write_text(f"{head}\n0.2,24,33\n0.5,29,17.5\n0.75,22,12\n0.97,11,9\n")
+    assert main(["new", "mine", "--stations", "b.csv", "--diameter-in", "12"]) == 0
+    assert "read as beta_deg" in capsys.readouterr().out
+    assert main(["new", "small", "--stations", "b.csv", "--diameter-mm", "12"]) == 2
+    assert "A diameter of 12 mm? 12 in is --diameter-in 12" in capsys.readouterr().err

@@ -22,8 +22,18 @@ ABOUT = (
 )
 
 
-def made(label: str, chord: float, pitch: float) -> bemt.Propeller:
-    """Propeller of a label; a chord over radius (0: not measured) or a share of its pitch is taken as measured."""
+def own(text: str) -> Path | None:
+    """Case folder or file of stations that a text names; None for a label."""
+    path = Path(text.strip()).expanduser()
+    return path if text.strip() and path.exists() else None
+
+
+def made(label: str, chord: float, pitch: float, diameter_in: float = 0.0) -> bemt.Propeller:
+    """Propeller of a case, stations or a label, whose chord over radius (0: no) and share of pitch are as measured."""
+    path = own(label)
+    if path is not None:
+        case = path.is_dir() or path.suffix == ".toml"
+        return bemt.load(path) if case else bemt.propeller(stations=path, diameter_in=diameter_in)
     found = bemt.propeller(label)
     changes: dict[str, float] = {}
     if chord > 0.0:
@@ -69,19 +79,23 @@ def asked(st: Any) -> tuple[bemt.Propeller, float, float, tuple[float, int] | No
     """What the user sets: the propeller, rev/min, m/s, and K_v and cells of a motor."""
     with st.sidebar:
         st.header("Propeller")
-        label = st.text_input("Label", "10x5", help=told("label"))
-        known = st.checkbox("I measured the chord")
-        chord = st.slider("Largest chord / radius", 0.05, 0.40, 0.20, 0.005, disabled=not known)
-        pitch = st.slider("Pitch / pitch of the label", 0.7, 1.3, 1.0, 0.01)
+        label = st.text_input("Label, case folder or file of stations", "10x5", help=told("label"))
+        path = own(label)
+        stations = path is not None and path.is_file() and path.suffix != ".toml"
+        diameter = st.number_input("Diameter [in]", 1.0, 400.0, 10.0, 0.5) if stations else 0.0
+        known = st.checkbox("I measured the chord", disabled=path is not None)
+        chord = st.slider("Largest chord / radius", 0.05, 0.40, 0.20, 0.005, disabled=not known or path is not None)
+        pitch = st.slider("Pitch / pitch of the label", 0.7, 1.3, 1.0, 0.01, disabled=path is not None)
+        propeller = made(label, chord if known else 0.0, pitch, diameter)
         st.header("Operating point")
-        sonic = math.ceil(60.0 * 340.0 / (math.pi * bemt.propeller(label).case.diameter_m) / 1000.0) * 1000
+        sonic = math.ceil(60.0 * 340.0 / (math.pi * propeller.case.diameter_m) / 1000.0) * 1000
         rpm = st.slider("Speed of rotation [rev/min]", 1000, max(sonic, 2000), min(6000, sonic), 100, help=told("rpm"))
         airspeed = st.slider("Airspeed [m/s]", 0.0, 40.0, 0.0, 0.5, help=told("airspeed_m_s"))
         st.header("Motor and battery")
         motor = st.checkbox("With a motor")
         kv = st.slider("K_v [rev/min/V]", 100, 4000, 900, 10, disabled=not motor, help=told("kv"))
         cells = st.slider("LiPo cells", 1, 12, 3, disabled=not motor, help=told("cells"))
-    return made(label, chord if known else 0.0, pitch), float(rpm), float(airspeed), (kv, cells) if motor else None
+    return propeller, float(rpm), float(airspeed), (kv, cells) if motor else None
 
 
 def answer(st: Any, propeller: bemt.Propeller, rpm: float, V: float, motor: tuple[float, int] | None) -> None:

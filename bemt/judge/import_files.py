@@ -172,4 +172,4 @@ def _beside(
     (view,) = first_picture(records, cases)
     if picture is not None:
         write_atomic(Path(str(picture)), view.png())
-    return view.sentence, view.document()
+    return " ".join((view.sentence, *view.notes)), view.document()

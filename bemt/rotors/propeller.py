@@ -587,6 +587,8 @@ def rotor_of(given: Propeller | Case | str | os.PathLike[str]) -> Propeller:
     text = os.fspath(given)
     if Path(text).exists() or fresh.is_path(text):
         return load(text)
+    if size := fresh.own_name(text):
+        raise InputError(Fault(text, "", "no folder or case of this name", f"a case, or a label: {size}"))
     try:
         return propeller(text)
     except InputError:

@@ -192,15 +192,15 @@ class RecordingToml(Table):
     """recording.toml: what a table of measurements does not say of itself."""
 
     recording: RecordingHead
-    columns: ColumnsTable = entry("channels", required=True, words="a table with one channel or more")
+    columns: ColumnsTable = entry("channels whose headings do not say all", default=ColumnsTable())
     rotor: RotorFacts = RotorFacts()
     air: AirFacts = AirFacts()
     stand: StandFacts = StandFacts()
 
     def rules(self) -> Iterable[tuple[str, ...]]:
-        """One channel or more."""
-        if not self.columns.given():
-            yield "columns", "a table without channels", "a table with one channel or more"
+        """Something that the table does not say itself."""
+        if not any(part.given() for part in (self.columns, self.rotor, self.air, self.stand)):
+            yield "columns", "a table without channels", "a table with one channel or more, [air], [rotor] or [stand]"
 
 
 def sniff(head: bytes | str) -> bool:

@@ -87,6 +87,12 @@ FEWEST_OF_CURVE, MOST_OF_CURVE, SAME_SPEED = 5, 400, 0.02
 """Readings that make a curve, those of no table of points, and the share by which equal speeds differ. [1]"""
 MOST_RPM_PER_V = 8000.0
 """Speed over supply voltage that no usual motor reaches. [(rev/min)/V]"""
+STICKS = ("airspeed_m_s", "thrust_N", "torque_Nm")  # readings of a table that `stuck` judges
+HELD, DIGITS, NEAR = 5, 100.0, 0.01
+"""Equal readings in a row that chance does not give; steps of its last digit in a reading that shows it; equal speeds
+and readings to a share. [1]"""
+MOVES = 0.05
+"""Change of a load over the square of the speed, of the largest, that its own noise does not make. [1]"""
 _CLOCK = re.compile(r"(?:(\d{4})-(\d\d)-(\d\d)[ T])?(\d{1,2}):(\d\d):(\d\d)(?:\.(\d+))?(?:Z|[+-]\d\d:?\d\d)?")
 DAY = 86400.0
 
@@ -200,3 +206,46 @@ def against_load(speed: Array, load: Array) -> Array:
     """
     k = np.sqrt(load) / speed
     return np.asarray(k / np.median(k))
+
+
+def _last_digit(seen: Array, steps: Array) -> float:
+    """Step of the last decimal of some readings; where another unit has hidden it, the least between two of them."""
+    tens = (10.0**-k for k in range(7))
+    found = (step for step in tens if np.all(np.abs(seen / step - np.round(seen / step)) < 1e-6))
+    return next(found, float(steps.min()) if steps.size else np.inf)
+
+
+def stuck(name: str, values: Mapping[str, Array]) -> NDArray[np.bool_]:
+    """Readings of a table of points that repeat the one before to the last digit while what moves them changes, (N,).
+
+    Airspeed: at one speed of rotation it fixes the loads; they change all the same. A load: airspeed or speed change,
+    and the other load with them. Only one stretch of a column sticks; a set point that was typed in comes back in
+    others, or has no readings near it with other digits. The first of the stretch may be a reading, and is not named.
+
+    >>> n, V = np.full(9, 5000.0), np.array([0, 2.01, 4.0, 6.02, 6.0, 8.03, 8.03, 8.03, 8.03])
+    >>> stuck("airspeed_m_s", {"rpm": n, "airspeed_m_s": np.append(V, 8.03), "thrust_N": 9.0 - np.arange(10)}).nonzero()
+    (array([6, 7, 8, 9]),)
+    """
+    v, rpm = values[name], values.get("rpm")
+    out = np.zeros(v.size, dtype=bool)
+    if rpm is None or "time_s" in values or not HELD < v.size <= MOST_OF_CURVE:
+        return out
+    edges = [0, *(np.flatnonzero(v[1:] != v[:-1]) + 1).tolist(), v.size]
+    held = [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True) if b - a > 2 and v[a] != 0.0]
+    if len(held) != 1 or held[0].stop - held[0].start < HELD:
+        return out
+    rows, seen = held[0], np.unique(np.abs(v[np.isfinite(v)]))
+    steps = np.diff(seen)
+    loads = [values[k] for k in ("thrust_N", "torque_Nm") if k in values and k != name]
+    if name == "airspeed_m_s":
+        readings = bool(np.any(steps <= NEAR * seen[1:]))
+        one_speed = np.abs(rpm[rows, None] / rpm[rows] - 1.0) <= NEAR
+        scaled = [load / rpm**2 for load in loads]
+        moves = [np.any(one_speed & (np.abs(k[rows, None] - k[rows]) > MOVES * np.nanmax(np.abs(k)))) for k in scaled]
+    else:
+        readings = abs(float(v[rows.start])) >= DIGITS * _last_digit(seen, steps)
+        flow = values.get("airspeed_m_s", np.zeros(v.size))
+        state = [x for x in (rpm, flow) if np.ptp(x[rows]) > MOVES * np.nanmax(np.abs(x))]
+        moves = [np.ptp(load[rows]) > MOVES * np.nanmax(np.abs(load)) for load in loads if state]
+    out[rows.start + 1 : rows.stop] = readings and any(moves)
+    return out

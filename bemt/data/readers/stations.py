@@ -28,6 +28,7 @@ _HEADS: dict[str, tuple[set[str], set[str]]] = {  # column: its own words, words
     "pitch": ({"pitch", "p"}, {"blade", "local", "geometric", "of"}),
     "thickness": ({"thickness", "t"}, {"blade", "local", "section", "relative", "maximum", "max", "ratio", "of"}),
 }
+_ANGLE = re.compile(r"(?<![a-z])angle(?![a-z])")
 _TIPS = {"r": 1.0, "rtip": 1.0, "r tip": 1.0, "radius": 1.0, "d": 2.0, "diameter": 2.0}
 """What lengths are shares of, in tip radii."""
 _TWIST = "Rename it to beta_deg if it is the angle to the plane of rotation; twist may count from elsewhere"
@@ -131,6 +132,16 @@ def read_stations(path: Path, R: float) -> BladeStations:
     table = split_table(source, header=True, most_misfits=1.0)
     top = table.headings_line
     found = [column for j, text in enumerate(table.headings) if (column := _column(j, text, R))]
+    told = []
+    if not any(
+        column.name in ("beta", "pitch") for column in found
+    ):  # beside r and chord one angle is that of the blade
+        bare = [(j, h) for j, h in enumerate(table.headings) if _ANGLE.search(plain(h))]
+        angles = (
+            [c for j, h in bare if (c := _column(j, _ANGLE.sub("blade angle", plain(h)), R))] if len(bare) == 1 else []
+        )
+        told = [f"column {bare[0][1]!r} read as beta_deg, the angle to the plane of rotation" for _ in angles]
+        found += angles
     by_name = {name: [c for c in found if c.name == name] for name in _HEADS}
     wanted = ("r", "chord", "beta" if by_name["beta"] or not by_name["pitch"] else "pitch")
     if lacking := [name for name in wanted if not by_name[name]]:
@@ -176,6 +187,7 @@ def read_stations(path: Path, R: float) -> BladeStations:
         left = [*left, f"column {heading!r} not used: {why}"]
         thick = None
     used = {p.at for p in places} | {c.at for c in thicknesses}
+    left = [*told, *left]
     left += [f"column {h!r} not used" for j, h in enumerate(table.headings) if j not in used and h.strip()]
     return BladeStations(np.minimum(x, 1.0), c, np.radians(beta), thick, tuple(left))
 
@@ -196,8 +208,11 @@ def _limits(source: SourceText, places: list[_Column], columns: tuple[Array, Arr
     x, c, beta = columns
     is_length = not places[0].share
     limits = ((x.max(), 0.75 if is_length else 0.0, 1.001), (c.max(), 0.0, WIDEST), (np.abs(beta).max(), 0.0, 90.0))
+    small = f"A diameter of {2e3 * R:g} mm? {2e3 * R:g} in is --diameter-in {2e3 * R:g}"
     radius = f"Is the tip radius {1e3 * R:g} mm?" if is_length else "Divide the radius by the tip radius"
+    in_inches = not (is_length or places[1].share) and c.max() * 1e-3 / units.INCH <= WIDEST
     chord = "Divide the chord by the tip radius; one over the diameter is chord_over_D" if places[1].share else radius
+    chord = small if in_inches else chord
     hints = (radius, chord if c.max() > WIDEST else "", "")
     for place, (value, low, high), hint in zip(places, limits, hints, strict=True):
         if not low <= value <= high:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from bemt.base import units
+from bemt.base.action import did_you_mean
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.tables import write_atomic
 from bemt.base.toml import validated
@@ -268,7 +269,8 @@ class _Measured:
     def unit(self, name: str, text: str) -> tuple[str, Facts] | Fault:
         """``--unit NAME=UNIT``, of a quantity or a heading."""
         if name not in CHANNELS and name not in self.known:
-            return Fault("", "--unit", name, f"one of {some(map(repr, self.known), 12)}, or a quantity")
+            meant = did_you_mean(name, [*CHANNELS, *self.known]).strip()
+            return Fault("", "--unit", name, f"one of {some(map(repr, self.known), 12)}, or a quantity", meant)
         quantity = name if name in CHANNELS else self.taken.get(name) or self._by_unit(name, text)
         told = None if quantity is None else _unit(quantity, text)
         if quantity is None or told is None:

@@ -12,7 +12,7 @@ from bemt.base import unit_errors
 from bemt.base.arrays import Array
 from bemt.base.tables import number_of
 from bemt.base.units import ZERO_CELSIUS
-from bemt.data.readers.samples import lone
+from bemt.data.readers.samples import STICKS, lone, stuck
 from bemt.data.recordings.channels import shaft_power
 from bemt.data.recordings.findings import (
     MOTOR_EFFICIENCY,
@@ -140,6 +140,28 @@ def misread(facts: Facts) -> Iterator[Finding]:
             )
             fix = "mistyped, or a loose contact? Measure it again; `diagnose` leaves it out"
             yield Finding("misread", facts.named(name), text, fix, (i,), "warning")
+
+
+@check_for("stuck")
+def sticks(facts: Facts) -> Iterator[Finding]:
+    """A sensor that repeats one reading in part of a table of points."""
+    for name in (k for k in STICKS if facts.get(k) is not None):
+        rows = np.flatnonzero(stuck(name, facts.values))
+        if rows.size:
+            whole = np.append(rows[0] - 1, rows)
+            changes = [
+                f"{facts.named(k)} goes from {np.nanmin(facts.values[k][whole]):.4g} to "
+                f"{np.nanmax(facts.values[k][whole]):.4g}"
+                for k in (*STICKS, "rpm")
+                if k != name and k in facts.values and _varies(facts.values[k][whole])
+            ]
+            text = (
+                f"{facts.values[name][rows[0]]:.6g} to the last digit in {whole.size} rows ({where_of(facts, whole)}) "
+            )
+            text += f"while {' and '.join(changes)}"
+            left = "those rows" if name == "airspeed_m_s" else "those readings"
+            fix = f"is the sensor stuck? Measure these points again; {left} are left out, all but the first"
+            yield Finding("stuck_sensor", facts.named(name), text, fix, tuple(rows.tolist()), "warning")
 
 
 @check_for("units_within")

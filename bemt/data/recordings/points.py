@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.data.readers.samples import MISREAD, against_load
+from bemt.data.readers.samples import MISREAD, STICKS, against_load, stuck
 from bemt.data.recordings import plateaus
 from bemt.data.recordings.channels import LOADS, DroppedCells, file_name, lost, moves, runs_of, stated
 from bemt.physics.dataset import Dataset
@@ -352,13 +352,14 @@ def from_rows(rec: Dataset) -> Found:
     rest = at_rest(rec)
     data = _clean(rec, rest, found)
     _wild(rec, data, rest, found)
-    copied = _copied(data, len(rec)) & ~rest
+    gone = _stuck(rec, data, found)
+    copied = _copied(data, len(rec)) & ~rest & ~gone
     found.lost += lost(rec, np.flatnonzero(copied), "", "repeats the row before to the last digit")
     time = rec.values.get("time_s")
     loads = [data[name] for name in LOADS if name in data]
     empty = ~np.any([np.isfinite(v) for v in loads], axis=0) if loads else np.ones(len(rec), dtype=bool)
     found.lost += lost(rec, np.flatnonzero(empty), "", "no load, power or coefficient in this row")
-    empty |= copied
+    empty |= copied | gone
     runs, told = runs_of(rec), stated(rec)
     before: dict[float, float] = {}
     at: dict[float, list[int]] = {}
@@ -381,6 +382,21 @@ def from_rows(rec: Dataset) -> Found:
     for run in list(at):
         _close(rec, data, time, at, run, found)
     return found
+
+
+def _stuck(rec: Dataset, data: dict[str, Array], found: Found) -> NDArray[np.bool_]:
+    """Leave out loads that stick; the rows of an airspeed that does, (N,), are none without it."""
+    gone = np.zeros(len(rec), dtype=bool)
+    for name in (k for k in STICKS if k in rec.values):
+        rows = np.flatnonzero(stuck(name, rec.values))
+        whole = name == "airspeed_m_s"
+        reason = f"{name} repeats the row before to the last digit while what moves it changes: stuck?"
+        found.lost += lost(rec, rows, "" if whole else name, reason)
+        if whole:
+            gone[rows] = True
+        else:
+            data[name] = _without(data[name], rows.tolist())
+    return gone
 
 
 def _copied(data: Mapping[str, Array], rows: int) -> NDArray[np.bool_]:

@@ -403,7 +403,9 @@ def air_of(values: Mapping[str, Array], n: int, constants: Mapping[str, float]) 
         found = _moist(values, temperature)
     if found is not None and np.any(np.isfinite(found.rho)):
         return found
-    note = "no density: no coefficients; give pressure and temperature, or a density"
+    note = (
+        "no density: no coefficients; give a column of it, or of pressure and temperature, or [air] in recording.toml"
+    )
     return AirOfPoints(np.full(n, np.nan), _sound(temperature), (*(found.notes if found else ()), note))
 
 

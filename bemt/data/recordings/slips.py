@@ -1,6 +1,7 @@
 """Slips of units, found by what must hold between the channels.
 
-Every relation used here is a product of powers of the recorded quantities: CT = T / (rho n^2 D^4), figure of merit,
+Every relation used here is a product of powers of the recorded quantities: CT = T / (rho n^2 D^4), figure of merit
+(in flight the ideal power of axial momentum theory over the power, near the recorded state),
 shaft power over electrical power, thrust over (efficacy x power), tip Mach number, thrust over that of the K1/K2
 formula. A relation has a window that any propeller of any size keeps, or, where the file holds a product of its own
 columns, the exact value 1. The windows of static CT, CQ and figure of merit are about twice as wide as the 130 static
@@ -32,6 +33,8 @@ EXACT = 0.03
 ALIKE = 4.0
 """Difference in score (chi-square) within which slips are told together."""
 
+_FEWEST = 3  # rows that a relation rests on
+_IN_FLIGHT = 1.4  # share of the ideal power over that at rest: blades are near their best angle, 0.7 against 0.5
 ELECTRICAL, MISCOUNT = "rpm_electrical", "rpm_ratio"
 SAME_DIGITS = 0.001
 """Scatter of a product that the file itself formed. [1]"""
@@ -138,6 +141,18 @@ def _quantities(facts: Facts) -> dict[str, Array]:
     return {k: np.where(v > 0.0, v, np.nan) for k, v in q.items()}
 
 
+def _merit_rows(facts: Facts, still: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], Array]:
+    """Rows for a figure of merit and their airspeed [m/s], (N,): at rest, else, as in a tunnel, all that pull.
+
+    The ideal power at an airspeed V is T (V / 2 + sqrt(V^2 / 4 + T / (2 rho A))) (Glauert 1935, eq.
+    VII 2.3 times T); at rest that is T^1.5 / sqrt(2 rho A).
+    """
+    V, T = facts.airspeed_m_s, facts.thrust_N
+    if V is None or T is None or np.count_nonzero(still) >= _FEWEST:
+        return still, np.zeros(len(facts))
+    return facts.loaded & (np.nan_to_num(T) > 0.0), np.maximum(np.nan_to_num(V), 0.0)
+
+
 def relations(facts: Facts) -> list[Relation]:
     """Relations that the recorded channels allow."""
     q = _quantities(facts)
@@ -156,7 +171,7 @@ def relations(facts: Facts) -> list[Relation]:
             v = np.exp(sum(p * np.log(q[k]) for k, p in powers.items())) * scale
         v = np.broadcast_to(v, rows.shape)[rows]
         v = v[np.isfinite(v) & (v > 0.0)]
-        if v.size < (1 if facts.settled else 3):
+        if v.size < (1 if facts.settled else _FEWEST):
             return
         value = float(np.median(v))
         span = np.percentile(v, [20.0, 80.0])
@@ -180,24 +195,33 @@ def relations(facts: Facts) -> list[Relation]:
     add("CQ", {"Q": 1.0, "n": -2.0, "D": -5.0}, 1 / rho, CQ, (0.009, 1.7))
     add("CQ from shaft power", {"P": 1.0, "n": -3.0, "D": -5.0}, 1 / (tau * rho), CQ, (0.009, 1.7))
     add("torque over thrust x diameter", {"Q": 1.0, "T": -1.0, "D": -1.0}, 1.0, (0.025, 0.4), (0.08, 1.4))
-    area = np.sqrt(2.0 * math.pi / 4.0 * rho)
-    merit = math.sqrt(2.0 * 1.3) if duct else 1.05
-    # without a diameter the one that makes CT = 0.1 stands in; it enters with the fourth root only
-    guess, told = (0.1 * rho) ** 0.25 / area, "diameter guessed by CT = 0.1"
-    for words, power in (("torque x speed", shaft), ("shaft power", {"P": 1.0})):
-        inverse = {k: -p for k, p in power.items()}
-        scale, name = 1 / tau if power is shaft else 1.0, f"figure of merit from {words}"
-        if "D" in q:
-            add(name, {"T": 1.5, "D": -1.0, **inverse}, scale / area, (0.11, merit), (0.5, 1.4))
-        elif "n" in q:
-            powers = {"T": 1.25, **inverse, "n": inverse.get("n", 0.0) + 0.5}
-            add(f"{name}, {told}", powers, scale * guess, (0.11, 2.4 if duct else 1.4), (0.5, 1.4))
-    name = "figure of merit from electrical power"
-    if "D" in q:
-        add(name, {"T": 1.5, "D": -1.0, **minus}, 1 / area, (0.02, merit), (0.33, 1.8))
-    elif "n" in q:
-        powers = {"T": 1.25, "n": 0.5, **minus}
-        add(f"{name}, {told}", powers, guess, (0.02, 2.0 if duct else 1.2), (0.33, 1.8))
+    disk = 0.5 * math.pi * rho  # 2 rho A over the square of the diameter
+    most = math.sqrt(2.0 * 1.3) if duct else 1.05
+    # without a diameter the one that makes CT = 0.1 stands in; at rest it enters with the fourth root only
+    rows, V = _merit_rows(facts, still)
+
+    def add_merit(words: str, power: Mapping[str, float], scale: float, low: float, guessed: float,
+                  usual: tuple[float, float]) -> None:  # fmt: skip
+        if not {"T", *power} <= q.keys() or not q.keys() & {"D", "n"}:
+            return
+        known = "D" in q
+        square = q["D"] ** 2 if known else np.sqrt(q["T"] / (0.1 * rho)) / q["n"]
+        w = np.hypot(0.5 * V, np.sqrt(q["T"] / (disk * square)))
+        share = ((w - 0.5 * V) / w)[rows]
+        e = 0.5 * float(np.nanmedian(share)) if np.any(np.isfinite(share)) else 0.5
+        powers = {"T": 1.0 + e, "D": -2.0 * e} if known else {"T": 1.0 + 0.5 * e, "n": e}
+        powers = {k: powers.get(k, 0.0) - power.get(k, 0.0) for k in (*powers, *power)}
+        merit = scale * q["T"] * (0.5 * V + w) / math.prod(q[k] ** p for k, p in power.items())
+        name = f"figure of merit from {words}" + ("" if known else ", diameter guessed by CT = 0.1")
+        per_unit = merit / math.prod(q[k] ** p for k, p in powers.items())
+        centre = usual[0] * (_IN_FLIGHT if rows is not still else 1.0)
+        add(name, powers, per_unit, (low, most if known else guessed), (centre, usual[1]), rows)
+
+    guessed = 2.4 if duct else 1.4
+    add_merit("torque x speed", shaft, 1 / tau, 0.11, guessed, (0.5, 1.4))
+    add_merit("shaft power", {"P": 1.0}, 1.0, 0.11, guessed, (0.5, 1.4))
+    electrical = {k: -p for k, p in minus.items()}
+    add_merit("electrical power", electrical, 1.0, 0.02, 2.0 if duct else 1.2, (0.33, 1.8))
     add("torque x speed over electrical power", {**shaft, **minus}, tau, (0.02, 1.05), (0.6, 1.5), any_row)
     add("shaft power over electrical power", {"P": 1.0, **minus}, 1.0, (0.02, 1.05), (0.6, 1.5), any_row)
     add("tip Mach number", {"n": 1.0, "D": 1.0}, math.pi / 343.0, (0.02, 1.1), (0.3, 2.0), any_row)

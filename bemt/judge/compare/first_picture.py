@@ -101,9 +101,15 @@ class PredictionView:
             axes[-1, 0].locator_params(axis="x", nbins=6)
             handles, labels = axes[0, 0].get_legend_handles_labels()
             figure.legend(handles, labels, loc="outside lower center", ncols=2)
-            words = (self.sentence.replace(" %", "\N{NO-BREAK SPACE}%"), *self.notes[:2])
+            words = (self._title(), *self.notes[:2])
             figure.suptitle("\n".join(line for w in words for line in textwrap.wrap(w, _WIDE)), fontsize=9)
             return canvas.png(figure, canvas.DPI)
+
+    def _title(self) -> str:
+        """What the picture shows, in a line."""
+        found = [(_WORD[c], *self.inside(c)[:2]) for c in self.channels]
+        counts = ", ".join(f"{n} of {total} {word}" for word, n, total in found if total)
+        return f"{self.case}: {counts} readings in the 95 % band" if counts else self.sentence
 
     def _panel(self, axis: Any, channel: str) -> None:
         x, y, half = self.curve[self.over], self.curve[channel], self.curve.u[channel]

@@ -214,7 +214,8 @@ def diagnosed(
     names = [one if isinstance(one, str) else "recording" for one in files]
     told = document(answer) | {"recordings": names, "cases": [c.name for c in cases]} | beside
     if target is not None:
-        folder.write(target, answer, told, cases, figures=figures)
+        made = [rotor_of(one).text for one in given] if len(given) == len(cases) else []  # a label has no file
+        folder.write(target, answer, told, cases, figures, made)
     inside = "" if answer.said.verdict in CLAIMS else _inside(records, chosen)
     return Answer(answer, rotor_of(given[0] if len(given) == 1 and cases else cases[0]), told, blade, inside)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import textwrap
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -407,6 +408,12 @@ def first_picture(records: Sequence[Record], cases: Sequence[Case]) -> list[Pred
     """Put records beside their cases, one view a case; ``cases`` are one for all records, or one for each."""
     each = list(cases) * len(records) if len(cases) == 1 else list(cases)
     groups: dict[str, tuple[Case, list[Dataset]]] = {}
+    assumed = {str(c.path.resolve()) for r, c in zip(records, each, strict=True) if not r.air_recorded}
     for record, case in zip(records, each, strict=True):
         groups.setdefault(str(case.path.resolve()), (case, []))[1].append(points_of(record))
-    return [against_band(case, points) for case, points in groups.values()]
+    views = [against_band(case, points) for case, points in groups.values()]
+    told = {
+        key: f"No density recorded: {case.air().rho:.4g} kg/m³, that of the case." for key, (case, _) in groups.items()
+    }
+    return [replace(view, notes=(*([told[key]] if key in assumed else []), *view.notes))
+            for key, view in zip(groups, views, strict=True)]  # fmt: skip

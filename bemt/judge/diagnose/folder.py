@@ -24,15 +24,18 @@ if TYPE_CHECKING:
 
 
 def write(
-    folder: str, answer: Any, document: Mapping[str, object], cases: Sequence[Case], figures: bool = True
-) -> None:
-    """Write everything; improved cases of an earlier answer go."""
+    folder: str, answer: Any, document: Mapping[str, object], cases: Sequence[Case], figures: bool = True,
+    texts: Sequence[str] = (),
+) -> None:  # fmt: skip
+    """Write everything; improved cases of an earlier answer go. `texts` are those of cases that have no file."""
     out = Path(folder)
+    improved = _improved(out, answer, cases, texts)
     out.mkdir(parents=True, exist_ok=True)
     _forget(out, cases)
     write_atomic(out / "diagnosis.json", json_text(document))
     write_atomic(out / "diagnosis.txt", text(answer) + "\n")
-    _improved(out, answer, cases)
+    for file, content in improved.items():
+        write_atomic(file, content)
     if figures:
         from bemt.judge.diagnose import figures as pictures
 
@@ -88,14 +91,19 @@ def _forget(out: Path, cases: Sequence[Case]) -> None:
             file.unlink()
 
 
-def _improved(out: Path, answer: Any, cases: Sequence[Case]) -> None:
-    """Save the cases with what was found on, cases that `sweep` runs."""
+def _improved(
+    out: Path, answer: Any, cases: Sequence[Case], texts: Sequence[str]
+) -> dict[Path, bytes | str]:  # fmt: skip
+    """The cases with what was found on, cases that `sweep` runs, as files and their content; case.toml last."""
+    told = {c.path.resolve(): text for c, text in zip(cases, texts, strict=False)}
+    files: dict[Path, bytes | str] = {}
     for folder, case in _targets(out, cases).items():
-        document = improved_case(answer, case, case.path.read_text(encoding="utf-8-sig"))
-        if document:
-            for file in beside(case):  # stations, sections and recorded values lie beside the case, as before
-                write_atomic(folder / file.relative_to(case.folder), file.read_bytes())
-            write_atomic(folder / "case.toml", document)
+        source = case.path.read_text(encoding="utf-8-sig") if case.path.is_file() else told[case.path.resolve()]
+        document = improved_case(answer, case, source)
+        if document:  # stations, sections and recorded values lie beside the case, as before
+            files |= {folder / file.relative_to(case.folder): file.read_bytes() for file in beside(case)}
+            files[folder / "case.toml"] = document
+    return files
 
 
 # The case with what was found switched on: a case that ``sweep`` runs.

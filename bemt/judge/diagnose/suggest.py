@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.gaussian.whitening import whitener
-from bemt.base.units import ZERO_CELSIUS
+from bemt.base.units import ZERO_CELSIUS, Unit
+from bemt.data.readers.recording_toml import QUANTITIES
+from bemt.data.readers.unit_text import unit_of
 from bemt.judge.compare.change_document import AIR_OF_BOTH, DAYS
 from bemt.judge.diagnose import noise
 from bemt.judge.diagnose.assemble import assemble
@@ -420,8 +422,16 @@ def correction(names: Sequence[str], settings: Mapping[str, Mapping[str, Any]], 
         text, found = _check(name, record), settings.get(name, {})
         if float(found.get("factor", 1.0)) < 0.0 and "channel" in found:
             text = f"reverse the sign of {found['channel']} (sign = -1 in a recording.toml), or turn the sensor round"
-        return Suggestion(text, (), (), 0.0, 0.0, "look")
+        return Suggestion(text, (), (), 0.0, 0.0, "look", _restated(found))
     return None
+
+
+def _restated(found: Mapping[str, Any]) -> tuple[str, ...]:
+    """Option of `bemt import` that states the unit of a channel, where a setting of unit_slip names one."""
+    quantity = str(found.get("channel", "")).rpartition("_")[0]
+    unit = unit_of(str(found.get("unit", "")))
+    known = isinstance(unit, Unit) and unit.dimension == QUANTITIES.get(quantity)
+    return (f"--unit {quantity}={found['unit']}",) if known else ()
 
 
 def _check(name: str, record: Record) -> str:

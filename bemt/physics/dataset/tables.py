@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from bemt.base.arrays import Array
     from bemt.physics.dataset.points import Dataset
 
+ONE_SPEED, MOST_SPEEDS = 0.01, 6  # share by which the speeds of one set point differ; set points of a legend
+
 __all__ = ["plot", "to_html", "to_pandas", "to_xarray"]
 
 
@@ -89,11 +91,10 @@ def plot(d: Dataset, x: str | None = None, y: Sequence[str] = (), ax: Any = None
         ax.set_prop_cycle(color=CYCLE)
     drawn = [line.get_gid() for line in ax.lines]
     colours = {line.get_gid(): line.get_color() for line in ax.lines if drawn.count(line.get_gid()) == 1}
-    speeds = np.unique(d.rpm) if "rpm" in d and x != "rpm" else np.array([np.nan])
+    speeds = _speeds(d.rpm) if "rpm" in d and x != "rpm" else {np.nan: np.arange(len(d))}
     for channel in wanted:
-        for speed in speeds:
-            rows = np.flatnonzero(d.rpm == speed) if np.isfinite(speed) else np.arange(len(d))
-            rows = rows[np.argsort(d[x][rows], kind="stable")]
+        for speed, at_speed in speeds.items():
+            rows = at_speed[np.argsort(d[x][at_speed], kind="stable")]
             name = f"{channel}, {speed:.0f} rev/min" if len(speeds) > 1 else channel
             name = f"{name}, {d.name}" if beside else name
             style = {"marker": "o", "ls": ""} if points else {}
@@ -112,6 +113,25 @@ def plot(d: Dataset, x: str | None = None, y: Sequence[str] = (), ax: Any = None
     return ax
 
 
+def _speeds(rpm: Array) -> dict[float, NDArray[np.intp]]:
+    """Rows by speed of rotation: one set point where they lie within 1 %; of more than six all rows as one.
+
+    >>> {n: rows.tolist() for n, rows in _speeds(np.array([3006.0, 2998.0, 4000.0, 2999.0])).items()}
+    {2999.0: [1, 3, 0], 4000.0: [2]}
+    """
+    order = np.argsort(rpm, kind="stable")
+    v = rpm[order]
+    cuts, first = [], 0
+    for i in range(1, len(v)):
+        if v[i] > v[first] * (1.0 + ONE_SPEED):
+            cuts.append(i)
+            first = i
+    groups = np.split(order, cuts)
+    if len(groups) > MOST_SPEEDS:
+        return {float("nan"): np.arange(len(rpm))}
+    return {float(np.median(rpm[rows])): rows for rows in groups}
+
+
 def _axes(d: Dataset, x: str | None, y: Sequence[str] | str) -> tuple[str, list[str]]:
     """Channels to draw: those asked for, else what varies, and coefficients over J."""
     ways = [k for k in ("J", "airspeed_m_s", "rpm") if k in d and np.unique(d[k].round(9)).size > 1]
@@ -120,7 +140,9 @@ def _axes(d: Dataset, x: str | None, y: Sequence[str] | str) -> tuple[str, list[
     unknown = [key for key in (x, *wanted) if key not in d]
     if unknown:
         known = ", ".join(d.values)
-        raise InputError(Fault(d.name, ", ".join(unknown), "no such channel", f"one of {known}"))
+        made = {*unknown} & {"CT", "CP", "CQ", "eta", "J"}
+        hint = "d.derive(diameter_m, density_kg_m3) makes CT, CP, CQ, J and eta of loads" if made else ""
+        raise InputError(Fault(d.name, ", ".join(unknown), "no such channel", f"one of {known}", hint))
     return x, wanted
 
 

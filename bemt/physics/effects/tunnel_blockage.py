@@ -29,7 +29,10 @@ class TunnelBlockage(Effect):
     id = "tunnel_blockage"
     inviscid = True
     title = "wind tunnel blockage"
-    check = "compare disk area and test section: above 5 % the airspeed needs a correction"
+    check = (
+        "compare disk area and test section: above 5 % state their ratio in the case, [model] effects_on = "
+        '["tunnel_blockage(area_ratio=0.1)"]'
+    )
     sign = "thrust and torque rise with loading at airspeed: the shift of J grows with thrust, not with V"
     parameters = (Parameter("area_ratio", "1", 0.0, 0.25, "disk over test-section area", 5, 0.0),)
     on_by_default = False

@@ -14,7 +14,7 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
-from bemt.data.readers.uiuc_names import class_of, family_of
+from bemt.data.readers.uiuc_names import FAMILIES, class_of, family_of
 from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V
 from bemt.rotors.case.reading import parse_reading
 from bemt.rotors.case.unknowns import (
@@ -32,7 +32,7 @@ from bemt.rotors.case.unknowns import (
 )
 from bemt.rotors.measured import MeasuredRotor, find, records
 from geometry.common import GeometryError
-from geometry.designation import Designation, parse_designation
+from geometry.designation import Designation, blade_class, parse_designation
 
 if TYPE_CHECKING:
     from bemt.data.readers.stations import BladeStations
@@ -81,6 +81,18 @@ def is_path(text: str) -> bool:
 def looks_like_label(text: str) -> bool:
     """Whether a word has the sizes of a label, right or wrong, or is all digits."""
     return not is_path(text) and (text.strip().isdigit() or _LABEL.search(text) is not None)
+
+
+def own_name(text: str) -> str:
+    """Size in a name that somebody gave a case, such as ``my12x6``: a word that no maker has is glued to it; else "".
+
+    >>> [own_name(t) for t in ("my12x6", "b_12x6", "12x6", "my 12x6", "APC12x6", "HQ5x4.3x3", "prop_12x6")]
+    ['12x6', '12x6', '', '', '', '', '']
+    """
+    glued = re.fullmatch(r"([A-Za-z]+)[_-]?(\d.*)", text.strip())
+    if not glued or not _LABEL.search(glued[2]) or glued[1].casefold() in _MAKERS or blade_class(glued[1]):
+        return ""
+    return glued[2]
 
 
 def _case_for_label(path: str) -> Fault:
@@ -370,6 +382,7 @@ def of_stations(file: Path, diameter_m: float) -> tuple[float, str, BladeStation
     return float(np.clip(found.r_R.min(), 0.05, 0.3)), key, found
 
 
+_MAKERS = {"prop", "t", "q", *FAMILIES, *(word.casefold() for name in FAMILIES.values() for word in name.split())}
 _LABEL = re.compile(r"\d\s*[xX\u00d7*]\s*\d")
 
 

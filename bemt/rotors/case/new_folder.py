@@ -213,17 +213,23 @@ def _files(w: Wanted) -> dict[str, bytes]:
         text = fresh.stations_text(
             kept, D, blades, w.rpm, w.airspeed_m_s, hub, key, told, w.family, w.motor, name, table
         )
-        return {kept: held, "case.toml": text.encode()}
-    return {"case.toml": _label_text(w, w.label or "").encode()}
+        return {kept: held, "case.toml": _called(w, text).encode()}
+    return {"case.toml": _called(w, _label_text(w, w.label or "")).encode()}
+
+
+def _called(w: Wanted, text: str) -> str:
+    """Case file with the name that the user gave it."""
+    given = w.label or ""
+    sized = w.fan and w.diameter_mm is not None
+    name = fresh.case_name(given) if given and (sized or fresh.own_name(given)) else ""
+    return re.sub(r'^name = ".*"$', f'name = "{name}"', text, count=1, flags=re.M) if name else text
 
 
 def _label_text(w: Wanted, label: str) -> str:
     if not w.fan:
         return fresh.label_text(label, w.blades, w.rpm, w.airspeed_m_s, w.family, w.motor, reading=w.reading)
     if w.diameter_mm is not None:
-        text = fresh.fan_text(w.diameter_mm * 1e-3, None, w.blades, w.rpm, w.motor)
-        name = fresh.case_name(label) if label else ""
-        return re.sub(r'^name = ".*"$', f'name = "{name}"', text, count=1, flags=re.M) if name else text
+        return fresh.fan_text(w.diameter_mm * 1e-3, None, w.blades, w.rpm, w.motor)
     size = _SIZE.fullmatch(label.strip())
     if size is None:
         if "x" in label.lower():

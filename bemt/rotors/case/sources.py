@@ -210,4 +210,4 @@ def text(found: Sources, width: int = 100) -> str:
         for s in rows:
             lines += textwrap.wrap(f"{s.name}: {s.source}", width, initial_indent="  ", subsequent_indent="    ",
                                    break_on_hyphens=False, break_long_words=False)  # fmt: skip
-    return "\n".join(lines)
+    return "\n".join([*lines, "", "--bibtex prints the works as BibTeX"])
