@@ -174,13 +174,13 @@ def read_stations(path: Path, R: float) -> BladeStations:
         got = " after ".join(table.cell(i, places[0].at) for i in (back[0] + 1, back[0]))
         source.add(f"{table.lines[back[0] + 1]}:{places[0].at + 1}", got, "radii that ascend from line to line")
         source.check()
-    x, c, beta = columns
+    x, chord, beta = columns
     if wanted[2] == "pitch":
         beta = np.degrees(np.arctan2(beta, 2.0 * np.pi * x))
-    _limits(source, places, (x, c, beta), R)
+    _limits(source, places, (x, chord, beta), R)
     source.check()
     if thick is not None and not thicknesses[0].share:
-        thick = thick / c
+        thick = thick / chord
     if thick is not None and not (THICKNESSES[0] <= thick.min() and thick.max() <= THICKNESSES[1]):
         heading, reach = thicknesses[0].heading, f"{thick.min():.3g} to {thick.max():.3g} of the chord"
         why = f"{reach}; a section has 0.01 to 0.5. Per cent is t/c %, a length t_mm"
@@ -189,7 +189,7 @@ def read_stations(path: Path, R: float) -> BladeStations:
     used = {p.at for p in places} | {c.at for c in thicknesses}
     left = [*told, *left]
     left += [f"column {h!r} not used" for j, h in enumerate(table.headings) if j not in used and h.strip()]
-    return BladeStations(np.minimum(x, 1.0), c, np.radians(beta), thick, tuple(left))
+    return BladeStations(np.minimum(x, 1.0), chord, np.radians(beta), thick, tuple(left))
 
 
 def _thickness(table: SplitTable, columns: Sequence[_Column], decimal: str) -> tuple[Array | None, list[str]]:

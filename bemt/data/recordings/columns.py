@@ -440,7 +440,7 @@ def power_lost(facts: Facts) -> Iterator[Finding]:
         if T is None or (D is None and rpm is None) or facts.ducted:
             return
         with np.errstate(all="ignore"):
-            disk = (np.abs(T) / (0.1 * facts.rho * (rpm / 60.0) ** 2)) ** 0.25 if D is None and rpm is not None else D
+            disk = D if D is not None else (np.abs(T) / (0.1 * facts.rho * (np.asarray(rpm) / 60.0) ** 2)) ** 0.25
             shaft = np.abs(T) ** 1.5 / np.sqrt(0.5 * math.pi * facts.rho) / disk / USUAL_MERIT
         rows, words = facts.loaded & facts.still & (T > 0.0), "by its thrust the shaft takes about"
     with np.errstate(all="ignore"):

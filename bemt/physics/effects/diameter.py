@@ -25,6 +25,7 @@ class Diameter(Effect):
     title = "different diameter"
     check = "measure the diameter"
     sign = "torque changes a little more than thrust, both at every speed; V/(n D) shifts"
+    geometric = True
     parameters = (Parameter("change", "1", -0.4, 1.0, "declared; propellers that one motor turns", 9, 0.0, 0.1),)
     on_by_default = False
 
