@@ -31,6 +31,8 @@ class Costs:
 
 
 COSTS = Costs()
+SPREAD = "the spread of rotors and runs alone is likeliest"
+"""Start of the reason where "none" is likeliest, and not sure."""
 SECOND = 0.1
 """Where loads and drive are measured apart, each with a prior of its own: odds that one of them changed over those,
 where the other did; few pairs are of both (declared) [1]."""
@@ -166,7 +168,7 @@ def _sets(
 def _open(none: float, unknown: float, listed: Mapping[Explanation, float]) -> str:
     """Why nothing is said."""
     if none >= max(unknown, *listed.values(), 0.0):
-        return f"the spread of rotors and runs alone is likeliest ({none:.0%}), but not sure enough"
+        return f"{SPREAD} ({none:.0%}), but not sure enough"
     if unknown >= max(listed.values(), default=0.0):
         return f"something that is not in the library is likeliest ({unknown:.0%}), but not sure enough"
     return "several different explanations are possible"

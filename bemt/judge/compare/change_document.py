@@ -27,6 +27,7 @@ from bemt.judge.compare.recordings import (
 from bemt.judge.compare.selection import Invocation
 from bemt.judge.compare.smooth_change import Ratio
 from bemt.judge.explanation import Size
+from bemt.judge.loss import SPREAD
 from bemt.physics.effects import catalogue
 
 AIR_OF_BOTH = "--air-a TEMPERATURE,PRESSURE --air-b TEMPERATURE,PRESSURE"
@@ -95,7 +96,7 @@ def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
         firsts = {FAMILY.get(k, k): check for k, check in reversed(checks.items())}
         text = "; or ".join(reversed(firsts.values()))
         return {"text": text, "command": with_case}
-    text = "repeat the run of A and compare it with A; their difference is not a cause"
+    text = "repeat the run of A and compare it with A: so much two runs differ by without a cause"
     again = asked.command(b="A_AGAIN.csv", rows_b=asked.rows_a, air_b=asked.air_a)
     return {"text": text, "command": again}
 
@@ -308,6 +309,8 @@ def _open(doc: ComparedRuns, size: str) -> str:
     """Why nothing is said, and what is likeliest."""
     if doc.rule.endswith((IN_WIND, NOTHING_SHARED)):
         return f"These recordings cannot be compared: {doc.rule}."
+    if doc.rule.startswith(SPREAD):
+        return f"These recordings cannot say whether anything changed{size}; two runs may differ by as much."
     likely = [r.effect for r in doc.ranking if r.probability >= _GUESS]
     guess = "" if doc.rule == OTHER_STAND else families(likely, doc.ranking)
     return f"These recordings cannot say what changed{size}" + (f"; likeliest {guess}." if guess else ".")
