@@ -392,6 +392,8 @@ def sentence(doc: ComparedRuns) -> str:
     first = [r.effect for r in doc.ranking if r.effect not in ("none", "unknown")][:4]
     if doc.rule == OTHER_STAND or doc.rule.endswith((IN_WIND, NOTHING_SHARED)):
         return f"No cause can be given: {doc.rule}."
+    if doc.rule.startswith(SPREAD):
+        return f"No change is proven: {doc.rule}" + (f"; else {', '.join(first)}" if first else "") + "."
     return f"There is a change, but {doc.rule}" + (f". Likeliest: {', '.join(first)}" if first else "") + "."
 
 
