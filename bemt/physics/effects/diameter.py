@@ -33,6 +33,10 @@ class Diameter(Effect):
         """A duct fits one diameter."""
         return "blades of another diameter do not fit the duct" if flow.ducted else ""
 
+    def plausible(self, flow: Flow) -> bool:
+        """Sizes on sale are 4 % apart or more (half an inch at 12 in)."""
+        return abs(self.change) >= 0.04
+
     def flow(self, flow: Flow) -> None:
         """Conditions at which the rotor is similar to the larger one."""
         larger = 1.0 + self.change
