@@ -303,7 +303,7 @@ def test_a_sensor_that_sticks_in_part_of_a_table_is_named_and_hides_no_slip_of_a
             (("sound", TUNNEL), ("stuck", stuck), ("both", both), ("cell", cell), ("typed", typed), ("one", one_V))}  # fmt: skip
     found = {name: {f["id"]: f for f in one["findings"]} for name, one in told.items()}
     assert all(not found[name] for name in ("sound", "typed", "one"))
-    assert found["stuck"].keys() == {"stuck_sensor"} and found["stuck"]["stuck_sensor"]["rows"] == (10, 11, 12, 13, 14)
+    assert found["stuck"].keys() == {"stuck_sensor"} and found["stuck"]["stuck_sensor"]["rows"] == [10, 11, 12, 13, 14]
     assert found["cell"]["stuck_sensor"]["channel"] == "thrust_N"
     assert found["both"].keys() == {"stuck_sensor", "torque_unit"}
     assert "Ncm taken for Nm" in found["both"]["torque_unit"]["correction"]

@@ -152,7 +152,7 @@ def test_all_faults_are_found_at_once(put: Put) -> None:
         ("humidity_pct", "altitude_m = 10\nhumidity_pct", "air"), ("[air]", "[air]\ndensity_kg_m3 = 1.2", "air"),
         ('"run.csv"', '"other.csv"', ""), ('"run.csv"', '"../run.csv"', "recording.file"),
         ('session = "one"', "header = 1", "recording.header"), ('file = "run.csv"', "", "recording.file"),
-        ("u_zero = 1.0", "u_zero = -1.0", "columns.thrust.u_zero"), ("[columns]", "[column]", "columns"),
+        ("u_zero = 1.0", "u_zero = -1.0", "columns.thrust.u_zero"), ("[columns]", "[column]", "column"),
     ],
 )  # fmt: skip
 def test_each_fault_has_its_place(old: str, new: str, where: str, put: Put) -> None:

@@ -723,7 +723,7 @@ def test_steps_of_a_continuous_log_without_a_command_are_found(shared_data: Path
     got = find(data["time_s"], data, "thrust_N")
     assert every_row_once(got) and len(got.plateaus) == 23
     steady = [p for p in got.plateaus if not p.flags and p.mean["thrust_N"] > 3.0]
-    assert len(steady) == 13
+    assert len(steady) == 14
     k = np.array([p.mean["thrust_N"] / p.mean["electrical_rpm"] ** 2 for p in steady])
     assert np.max(np.abs(k / np.median(k) - 1)) < 0.1  # thrust goes nearly with the square of the speed
 

@@ -222,7 +222,7 @@ def stuck(name: str, values: Mapping[str, Array]) -> NDArray[np.bool_]:
     and the other load with them. Only one stretch of a column sticks; a set point that was typed in comes back in
     others, or has no readings near it with other digits. The first of the stretch may be a reading, and is not named.
 
-    >>> n, V = np.full(9, 5000.0), np.array([0, 2.01, 4.0, 6.02, 6.0, 8.03, 8.03, 8.03, 8.03])
+    >>> n, V = np.full(10, 5000.0), np.array([0, 2.01, 4.0, 6.02, 6.0, 8.03, 8.03, 8.03, 8.03])
     >>> stuck("airspeed_m_s", {"rpm": n, "airspeed_m_s": np.append(V, 8.03), "thrust_N": 9.0 - np.arange(10)}).nonzero()
     (array([6, 7, 8, 9]),)
     """

@@ -406,9 +406,10 @@ def stated_frame(frame: Any, unit: Iterable[str] = (), column: Iterable[str] = (
 
     >>> import pandas as pd
     >>> told = stated_frame(pd.DataFrame({"n": [100.0], "F": [2.0]}), ["F=gf"], ["rpm=n", "thrust=F"], ["thrust=-1"])
+    ... # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
-    bemt.base.errors.InputError: --unit: got no unit for rpm; expected --unit rpm= rpm or rad_s or rev_s or Hz.
+    bemt.base.errors.InputError: --unit: got no unit for rpm; expected --unit rpm=...
     >>> stated_frame(pd.DataFrame({"rpm": [6000.0], "F": [2.0]}), ["F=gf"], ["thrust=F"], ["thrust=-1"]).to_dict("list")
     {'rpm': [6000.0], 'thrust_gf': [-2.0]}
     """

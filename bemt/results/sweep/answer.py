@@ -93,13 +93,22 @@ def _percent(t: _Thrust) -> str:
     return f" ({100.0 * t.c.E / abs(t.c.D):+.0f} %)" if t.c.D and not near_zero else ""
 
 
+def _lines(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    text = text_table(list(header), [list(row) for row in rows], left=(0, len(header) - 1))
+    return [line.rstrip() for line in text.splitlines()]
+
+
 def _table(solved: Sequence[Result], found: Sequence[_Thrust]) -> list[str]:
     moving = any(r.airspeed_m_s for result in solved for r in result.of("bemt"))
     header = ["thrust [N]", "rpm", *(["V"] if moving else []), "BEMT", "W", "K1/K2", "recorded", "difference", "agree?"]
     kept = found[: max(ROWS - len(solved), 4)]
     body = [row for result in solved for row in _rows(result, [t for t in kept if t.case is result], moving)]
     shown = body[:ROWS]
-    lines = [line.rstrip() for line in text_table(header, shown, left=(0, len(header) - 1)).splitlines()]
+    lines = _lines(header, shown)
+    if max(map(len, lines)) > _WIDTH:  # the power is in --details, too
+        at = header.index("W")
+        header, *narrow = ([*row[:at], *row[at + 1 :]] for row in (header, *shown))
+        lines = _lines(header, narrow)
     left = len(found) - sum(1 for row in shown if row[-3] != "-")
     if left > 0 or len(body) > len(shown):
         lines.append(f"and {max(left, len(body) - len(shown))} more rows (--details shows all)")
