@@ -105,7 +105,7 @@ def _table(solved: Sequence[Result], found: Sequence[_Thrust]) -> list[str]:
     body = [row for result in solved for row in _rows(result, [t for t in kept if t.case is result], moving)]
     shown = body[:ROWS]
     lines = _lines(header, shown)
-    if max(map(len, lines)) > _WIDTH:  # the power is in --details, too
+    if max(map(len, lines)) > WIDTH:  # the power is in --details, too
         at = header.index("W")
         header, *narrow = ([*row[:at], *row[at + 1 :]] for row in (header, *shown))
         lines = _lines(header, narrow)
