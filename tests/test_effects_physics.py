@@ -21,7 +21,6 @@ from bemt.physics.effects.base import Effect, Flow, Loads, Reading
 from bemt.physics.effects.battery_sag import BatterySag
 from bemt.physics.effects.compressibility import Compressibility
 from bemt.physics.effects.cross_talk import CrossTalk
-from bemt.physics.effects.diameter import Diameter
 from bemt.physics.effects.drag_divergence import DragDivergence
 from bemt.physics.effects.drift import ThrustDrift
 from bemt.physics.effects.gain import ThrustGain
@@ -343,15 +342,6 @@ def test_oblique_inflow_parts_the_wind_and_the_solver_does_the_rest() -> None:
     assert met(turned, ObliqueInflow(5.0)).V == pytest.approx(met(recorded([6000.0], [8.0]), ObliqueInflow(40.0)).V)
     T = [float(flow_loads(recorded([6000.0], [8.0]), ObliqueInflow(a))[0][0]) for a in (0.0, 30.0, 60.0, 90.0)]
     assert np.all(np.diff(T) > 0.0)
-
-
-@pytest.mark.parametrize("V", [0.0, 8.0])
-def test_another_diameter_is_the_similar_rotor(V: float) -> None:
-    """Scaled blade for blade and solved: the same loads."""
-    small, large = (bem.Model(Rotor(helix(0.254 * k, 0.127 * k, hub=0.1), 2), [(0.7, table())]) for k in (1.0, 1.2))
-    got = dataclasses.replace(small, effects=(*small.effects, Diameter(0.2))).solve(6000.0, V)
-    for name in ("thrust_N", "torque_Nm"):
-        assert got[name] == pytest.approx(large.solve(6000.0, V)[name], rel=1e-6)
 
 
 def test_density_moves_thrust_and_torque_alike() -> None:

@@ -73,8 +73,16 @@ class Plan(Answered):
     @property
     def text(self) -> str:
         """Tables for a terminal."""
+        return self._told(False)
+
+    @property
+    def details(self) -> str:
+        """The same, with every effect that these points do not show, and why."""
+        return self._told(True)
+
+    def _told(self, every: bool) -> str:
         c = self.confusion
-        rows, unseen = [], [i for i in c.ids if self.detectable[i] == "no"]
+        rows, unseen = [], [i for i in c.ids if self.detectable[i] == "no" and not every]
         for a in np.argsort(-self.size):
             if c.ids[a] in unseen:
                 continue
@@ -90,19 +98,13 @@ class Plan(Answered):
             out.append(f"  cannot be distinguished: {', '.join(group)}")
         if self.added is not None:
             out.append(f"  to add: {self.added.text}{self.added.tells}")
-        if unseen or self.absent:
+        if every:
+            out += [f"  not visible: {i}: {why}" for i, why in self.absent.items()]
+        elif unseen or self.absent:
             gone = f"{len(unseen)} too small for these points" if unseen else ""
             cannot = f"{len(self.absent)} that they cannot hold" if self.absent else ""
             out.append(f"  not visible: {' and '.join(filter(None, (gone, cannot)))}; --details lists them")
         return "\n".join([*out, *(f"  note: {note}" for note in self.notes)])
-
-    @property
-    def details(self) -> str:
-        """The same, with every effect that these points do not show, and why."""
-        unseen = [f"{i}: size {s:.1f}, too small" for i, s in zip(self.confusion.ids, self.size, strict=True)
-                  if self.detectable[i] == "no"]  # fmt: skip
-        return "\n".join([self.text, *(f"  not visible: {one}" for one in
-                          (*unseen, *(f"{i}: {why}" for i, why in self.absent.items())))])  # fmt: skip
 
     def _document(self) -> Mapping[str, object]:
         """Schema ``bemt.plan/1``."""

@@ -29,6 +29,7 @@ class AnotherPropeller(Effect):
         Parameter("thrust", "1", -0.8, 4.0, "declared; propellers that one motor turns", 3, 0.0, 0.4),
         Parameter("torque", "1", -0.8, 4.0, "the same", 3, 0.0, 0.4),
     )
+    diagnosed = False
     on_by_default = False
 
     def loads(self, loads: Loads, flow: Flow) -> None:
