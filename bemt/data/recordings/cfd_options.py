@@ -325,10 +325,6 @@ class _Measured:
                 return
             facts["column"] = named[0]
         found, dimension = heading(str(facts["column"])).unit, CHANNELS[quantity]
-        sure = found is not None and found.suffix in units.UNITS and found.dimension == dimension
-        if "unit" in facts and sure and found is not None and found.suffix != facts["unit"]:
-            got = f"{quantity}={facts['unit']}, where the file says {facts['column']}"
-            yield Fault("", "--unit", got, "the unit of the file", "Leave it out")
         if "unit" not in facts:
             if found is None or found.suffix not in units.UNITS or found.dimension != dimension:
                 expected = f"--unit {quantity}= {' or '.join(units.suffixes(dimension))}"
