@@ -127,7 +127,7 @@ STUDY = """One condition on several grids is a study, and every command takes it
 state their cells). A table with a varying column of cells, or of their size (`cell_size`, `base size`), is
 one, too. Its value is that of the finest grid. Its
 uncertainty is GCI / 1.15 with the observed order of the finest three (Celik 2008; Roache 1994: factor 1.25, with two
-grids 3 and order 2); where values oscillate, diverge or give an order outside 0.5 to 3, it is three times their spread
+grids 3 and order 2); where values oscillate, diverge or give an order below 0.5, it is three times their spread
 over 1.15, and a note says so."""
 
 

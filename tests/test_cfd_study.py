@@ -341,6 +341,8 @@ def test_a_table_of_workbench_has_its_units_in_the_headings_or_in_a_row(tmp_path
     )
     with pytest.raises(InputError, match="got N, where the file says lbf"):
         assemble(run_from([str(tmp_path / "dp.csv")], unit=["thrust=N"]))
+    with pytest.raises(InputError, match="got 0, where the rows have 4"):
+        run_at(str(tmp_path / "dp.csv"), airspeed_m_s=0.0)
 
 
 def zoned(folder: Path, name: str, blade: float, hub: float, cells: float, rpm: float, zones: str) -> str:

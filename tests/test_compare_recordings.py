@@ -270,6 +270,22 @@ def test_a_wrong_pole_count_moves_the_points_along_the_speed(tmp_path: Path) -> 
     assert row["parameters"]["factor"]["value"] == pytest.approx(1.0 / 6.0, rel=0.01)
 
 
+def test_stairs_of_few_steps_are_no_ramp(tmp_path: Path) -> None:
+    """A lag was allowed for, which took a third of a change that every step shows."""
+    rng = np.random.default_rng(5)
+    rpm = np.repeat(np.arange(12e3, 33e3, 4e3), 12) + rng.normal(0.0, 15.0, 72)
+    files = []
+    for name, thrust, torque in (("a", 1.0, 1.0), ("b", 0.88, 0.97)):
+        noise = 1.0 + rng.normal(0.0, 0.005, (2, 72))
+        table = {"time_s": 0.25 * np.arange(72), "rpm": rpm, "thrust_N": thrust * 3.5e-9 * rpm**2 * noise[0],
+                 "torque_Nm": torque * 4.6e-11 * rpm**2 * noise[1]}  # fmt: skip
+        files.append(written(tmp_path / f"{name}.csv", table))
+    found = ratios_of(*files)
+    assert found["thrust_N"].points == (6, 6)
+    assert found["thrust_N"].ratio == pytest.approx(0.88, abs=0.006)
+    assert found["torque_Nm"].ratio == pytest.approx(0.97, abs=0.006)
+
+
 def test_what_lags_on_the_way_up_and_down_is_no_zero(tmp_path: Path) -> None:
     def both_ways(seed: int, lag: float) -> dict[str, Array]:
         up, down = stand(seed), stand(seed + 1)

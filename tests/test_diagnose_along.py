@@ -111,6 +111,16 @@ def test_our_campaigns_name_nothing_wrong(named: list[tuple[str, set[str], set[s
     assert not [one for one in named if not one[1] <= one[2]]
 
 
+def test_the_sign_of_a_torque_along_the_blade_is_the_sense_of_rotation(tmp_path: Path) -> None:
+    case = load_case(Path(__file__).parents[1] / "cases" / "prop_8x5" / "case.toml")
+    r = np.linspace(0.02, 0.1, 9)
+    for name, sign in (("right", 1.0), ("left", -1.0)):
+        rows = "".join(f"a,{x},{300.0 * x},{sign * 5.0 * x}\n" for x in r)
+        (tmp_path / f"{name}.csv").write_text("run,r_m,thrust_per_radius_N_m,torque_per_radius_Nm_m\n" + rows)
+    right, left = (along(case, tmp_path / f"{name}.csv")["a"] for name in ("right", "left"))
+    assert np.array_equal(right.torque, left.torque) and "nan" not in left.text()
+
+
 def test_a_file_without_its_columns_is_refused(tmp_path: Path) -> None:
     from bemt.base.errors import InputError
 

@@ -260,9 +260,14 @@ def _operating(work: OpenRun, rpm: Array) -> dict[str, Array]:
         ("airspeed_m_s", "airspeed", head.airspeed_m_s),
         ("density_kg_m3", "density", head.density_kg_m3),
     ):
-        own = [] if given is not None else work.named(quantity)
+        own = work.named(quantity)
         if given is not None:
             values[name] = np.array([given])
+            rows = bool(own) and own[0].record.clock not in ("time", "iteration")
+            told = work.si(quantity, own[0]) if rows else None
+            if told is not None and not np.allclose(told, given):
+                got = f"{given:g}, where the rows have {np.min(told):.4g} to {np.max(told):.4g}"
+                work.fault(None, quantity, got, "one source of it", "Leave out the option")
         elif own and (v := work.si(quantity, own[0])) is not None:
             values[name] = v[-1:] if own[0].record.clock in ("time", "iteration") else v
     return values

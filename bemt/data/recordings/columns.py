@@ -15,7 +15,7 @@ from bemt.base.units import ZERO_CELSIUS
 from bemt.data.readers.samples import STICKS, lone, stuck
 from bemt.data.recordings.channels import shaft_power
 from bemt.data.recordings.findings import (
-    MOTOR_EFFICIENCY,
+    LEAST_EFFICIENCY,
     Facts,
     Finding,
     check_for,
@@ -432,7 +432,6 @@ USUAL_MERIT = 0.5
 def power_lost(facts: Facts) -> Iterator[Finding]:
     """Far more power into the motor than its shaft takes; without a torque, than a usual rotor of that thrust takes."""
     electric, rows, words = facts.filled.get("electrical_power_W"), facts.loaded, "the shaft takes"
-    least = 0.5 * MOTOR_EFFICIENCY[0]  # measured: 0.15 far below the load of a motor, on a sound stand
     shaft = shaft_power(facts.filled)
     if electric is None or facts.bare:
         return
@@ -444,14 +443,13 @@ def power_lost(facts: Facts) -> Iterator[Finding]:
             disk = D if D is not None else (np.abs(T) / (0.1 * facts.rho * (np.asarray(rpm) / 60.0) ** 2)) ** 0.25
             shaft = np.abs(T) ** 1.5 / np.sqrt(0.5 * math.pi * facts.rho) / disk / USUAL_MERIT
         rows, words = facts.loaded & facts.still & (T > 0.0), "by its thrust the shaft takes about"
-        least = MOTOR_EFFICIENCY[0]
     with np.errstate(all="ignore"):
         ratio = (np.abs(shaft) / electric)[rows]
     ratio = ratio[np.isfinite(ratio)]
-    if ratio.size < 3 or not 0.0 < float(np.median(ratio)) < least:
+    if ratio.size < 3 or not 0.0 < float(np.median(ratio)) < LEAST_EFFICIENCY:
         return
     text = f"{words} {np.median(ratio):.0%} of it ({np.min(ratio):.0%} to {np.max(ratio):.0%} under load); "
-    text += f"a loaded motor turns {least:.0%} or more into power of the shaft"
+    text += f"a motor turns {LEAST_EFFICIENCY:.1%} or more into power of the shaft"
     fix = "check unit, gain and zero of the current and of the voltage; or several motors are on that supply"
     yield Finding("power_lost", facts.named("electrical_power_W"), text, fix, (), "warning")
 

@@ -152,7 +152,7 @@ def _reduced(imported: Dataset, diameter_m: float | None) -> tuple[Dataset, tupl
         steady = reduce(imported, diameter_m=diameter_m)
     except InputError:
         steady = None
-    if steady is not None and (reduction(steady).mode == "points" or _useful(steady) >= _ENOUGH):
+    if steady is not None and (reduction(steady).mode == "points" or _useful(steady) >= _ENOUGH or _stairs(steady)):
         return steady, ()
     slow = _ramp(imported)
     if slow is not None:
@@ -161,6 +161,13 @@ def _reduced(imported: Dataset, diameter_m: float | None) -> tuple[Dataset, tupl
             words = f"few steady points: {len(slow)} of {len(imported)} rows of a slow ramp are used as they are"
             return rows, (words,)
     return steady or reduce(imported, diameter_m=diameter_m), ()
+
+
+def _stairs(steady: Dataset) -> bool:
+    """Whether most samples stand still in the steady points: few plateaus, and no ramp."""
+    how = reduction(steady)
+    rows = sum(map(len, how.rows))
+    return rows > sum(len(gone.lines) for gone in how.dropped if not gone.channel)
 
 
 def _useful(points: Dataset) -> int:

@@ -79,9 +79,11 @@ class AlongBlade:
 
     def text(self) -> str:
         """Lines for people."""
-        rms = float(np.sqrt(np.mean(np.log(np.stack([self.thrust, self.torque])) ** 2)))
-        state = f" {self.state}" if self.state else ""
-        rows = [f"Along the blade{state} the loads differ by {100 * rms:.0f} % on the average."]
+        both, state = np.stack([self.thrust, self.torque]), f" {self.state}" if self.state else ""
+        differ = "have the other sign in some bands"
+        if np.all(both > 0.0):
+            differ = f"differ by {100 * float(np.sqrt(np.mean(np.log(both) ** 2))):.0f} % on the average"
+        rows = [f"Along the blade{state} the loads {differ}."]
         rows += [f"  ! {self.whole}"] if self.whole else []
         for name, ratio in (("thrust", self.thrust), ("torque", self.torque)):
             cells = (f"{a:.2f}-{b:.2f} R {100 * (v - 1):+.0f} %"
@@ -132,7 +134,7 @@ def read_blade_loads(path: Path) -> dict[str, BladeLoads]:
 
 
 @dataclass(frozen=True)
-class Stated:
+class SliceCondition:
     """Speed [rev/min], airspeed [m/s] and density [kg/m3] at which slices are compared, and who says the speed."""
 
     rpm: float
@@ -155,6 +157,8 @@ def along(
     out = {}
     for run, loads in read_blade_loads(path).items():
         _within(model.rotor.R, loads.r, path, run)
+        if np.trapezoid(loads.torque, loads.r) < 0.0:  # its sign is the sense of rotation
+            loads = replace(loads, torque=-loads.torque)
         at = _condition(case, loads, recorded, rpm, V, path)
         air = case.air() if at.density is None else Air.from_density(at.density)
         told = compare_along(model, loads, at.rpm, at.V, air)
@@ -178,7 +182,7 @@ def _within(R: float, r: Array, path: Path, run: str) -> None:
 
 def _condition(
     case: Case, loads: BladeLoads, recorded: Sequence[Record], rpm: float | None, V: float | None, path: Path
-) -> Stated:  # fmt: skip
+) -> SliceCondition:  # fmt: skip
     """Where slices are compared: as they state, as the options say, as the one condition that was recorded is."""
     own = [r for r in recorded if not r.reference]
     n, v = (np.concatenate([np.empty(0), *x]) for x in ([r.rpm for r in own], [r.V for r in own]))
@@ -194,7 +198,7 @@ def _condition(
         raise InputError(Fault(path.as_posix(), "rpm", got, "the speed of the slices", "A column rpm, or --rpm N"))
     if not one:
         speed, whose = (case.rpm, "of the case") if speed is None else (speed, whose)
-        return Stated(speed, case.airspeed_m_s if wind is None else wind, loads.density, whose)
+        return SliceCondition(speed, case.airspeed_m_s if wind is None else wind, loads.density, whose)
     measured: list[float] = []
     for name in ("thrust_N", "torque_Nm"):
         every = [r.measured.get(name, np.full(len(r), np.nan)) for r in own]
@@ -203,10 +207,12 @@ def _condition(
     density = float(np.mean(rho[here])) if loads.density is None else loads.density
     whose = "of the recording" if speed is None else whose
     speed = float(np.mean(n[here])) if speed is None else speed
-    return Stated(speed, float(np.mean(v[here])) if wind is None else wind, density, whose, (measured[0], measured[1]))
+    return SliceCondition(
+        speed, float(np.mean(v[here])) if wind is None else wind, density, whose, (measured[0], measured[1])
+    )
 
 
-def _whole(loads: BladeLoads, at: Stated, ducted: bool) -> str:
+def _whole(loads: BladeLoads, at: SliceCondition, ducted: bool) -> str:
     """What slices add up to, where that is not what the recording has; a duct carries a thrust of its own."""
     said = []
     both = (("thrust", "N", loads.thrust, at.loads[0]), ("torque", "N m", loads.torque, at.loads[1]))
