@@ -152,7 +152,8 @@ def _reduced(imported: Dataset, diameter_m: float | None) -> tuple[Dataset, tupl
         steady = reduce(imported, diameter_m=diameter_m)
     except InputError:
         steady = None
-    if steady is not None and (reduction(steady).mode == "points" or _useful(steady) >= _ENOUGH or _stairs(steady)):
+    points = steady is not None and (reduction(steady).mode == "points" or _useful(steady) >= _ENOUGH)
+    if steady is not None and (points or _stairs(steady, imported)):
         return steady, ()
     slow = _ramp(imported)
     if slow is not None:
@@ -163,11 +164,14 @@ def _reduced(imported: Dataset, diameter_m: float | None) -> tuple[Dataset, tupl
     return steady or reduce(imported, diameter_m=diameter_m), ()
 
 
-def _stairs(steady: Dataset) -> bool:
-    """Whether most samples stand still in the steady points: few plateaus, and no ramp."""
-    how = reduction(steady)
-    rows = sum(map(len, how.rows))
-    return rows > sum(len(gone.lines) for gone in how.dropped if not gone.channel)
+def _stairs(steady: Dataset, imported: Dataset) -> bool:
+    """Whether most samples, and most of the speeds, are those of the steady points: few plateaus, and no ramp."""
+    how, rpm = reduction(steady), named(imported).values.get("rpm")
+    if rpm is None or "rpm" not in steady:
+        return False
+    kept, seen = sum(map(len, how.rows)), (np.log(v[v > 0.0]) for v in (steady["rpm"], rpm))
+    still, every = (float(np.ptp(v)) if v.size else 0.0 for v in seen)
+    return still > 0.5 * every and kept > sum(len(gone.lines) for gone in how.dropped if not gone.channel)
 
 
 def _useful(points: Dataset) -> int:
