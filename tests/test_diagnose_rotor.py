@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnosing import CASES, case, points, recording
+from diagnosing import CASES, case, diagnose, points, recording
 
 from bemt.judge.diagnose import chain, other_rotor
 from bemt.judge.diagnose.assemble import build
 from bemt.judge.diagnose.load import load
 from bemt.judge.diagnose.record import from_series
+from bemt.judge.explanation import DOUBT
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case import load_case
 
@@ -129,3 +130,25 @@ def test_an_exact_relation_names_the_fault_that_the_loads_leave_open(tmp_path: P
     known = load_case(CASES / "prop_10x5")
     said = chain.diagnose([load(str(tmp_path / "log.csv"), known)], [known]).said
     assert (said.verdict, said.effects) == ("sensor", ("rpm_scale",)) and "must be 1" in said.why
+
+
+@pytest.mark.parametrize(("inch", "plan"), [(12.0, "grid"), (8.0, "static")])
+def test_loads_of_another_size_are_no_slip_of_the_speed(inch: float, plan: str) -> None:
+    """Two thirds of a speed fits twice the loads within the solver's error; a rotor of another size fits as well."""
+    guess = case("prop_10x5")
+    other = {"rotor.diameter_in": inch, "blade.pitch_in": 0.6 * inch}
+    said = diagnose(recording(guess.replaced(other), points(plan, 0.254), noise=0.005), guess)
+    assert not {"rpm_scale", "air_density"} & set(said.decision.effects), said.decision
+    assert said.decision.verdict == "insufficient"
+    assert said.found.probability[DOUBT] > 0.3
+
+
+def test_another_diameter_than_the_reference_has_is_another_propeller() -> None:
+    guess, given = case("prop_10x5"), points("grid", 0.254)
+    other = guess.replaced({"rotor.diameter_in": 9.0, "blade.pitch_in": 4.5})
+    runs = [recording(rotor, given, noise=0.005, seed=k) for k, rotor in enumerate((guess, other))]
+    records = [replace(from_series(run, guess), reference=k == 0) for k, run in enumerate(runs)]
+    said = chain.diagnose(records, [guess]).decision
+    assert said.verdict in ("named", "class")
+    assert "propeller" in said.effects, said
+    assert not {"pitch_offset", "section", "air_density"} & set(said.effects), said

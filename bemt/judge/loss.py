@@ -107,7 +107,7 @@ def decide(
     if verdict == "unknown":
         return replace(decision, probability=unknown, why="something smooth that is not in the library fits best")
     if doubt >= 0.5:
-        return replace(decision, probability=doubt, why="the files contradict themselves or each other")
+        return replace(decision, probability=doubt, by="files", why="rotor, unit or file is not what is stated")
     most = max(none, unknown, *listed.values(), 0.0)
     return replace(decision, probability=1.0 - most, why=_open(none, unknown, listed))
 
@@ -121,8 +121,8 @@ def _least(
     moved = sum(counted[k] for k in listed if k.ids & still)
     cause, calm = sum(counted[k] for k in listed) - moved, none + moved
     answers: dict[tuple[str, tuple[str, ...]], float] = {
-        ("none", ()): c.missed * (cause + unknown) + c.wrong * doubt,
-        ("unknown", ()): c.phantom * calm + c.missed * cause + c.wrong * doubt,
+        ("none", ()): c.missed * (cause + unknown + doubt),
+        ("unknown", ()): c.phantom * calm + c.missed * (cause + doubt),
         ("insufficient", ()): c.silent * (cause + unknown) + c.timid * calm,
     }
     for k in [k for k in listed if not k.ids & still][:_NAMES]:

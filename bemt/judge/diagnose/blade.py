@@ -29,13 +29,15 @@ if TYPE_CHECKING:
 
 # Standard deviations without a reference, in the order of NAMES: angle [deg], lift, drag [1], camber [deg].  Working
 # calibrations; a wide blade without a reference would swallow slips of speed and unit.
-_PLAIN = (0.3, 0.03, 0.10, 0.0)
+AS_BUILT = (0.3, 0.03, 0.10, 0.0)
 # With a reference, by how the blade is known.  One degree and more between published stations and blades (zero-thrust
 # advance ratios of UIUC volumes 1 and 2); a label leaves the section and the law of the blade angle open as well.
 _SD = {
     "cad": (0.1, 0.02, 0.05, 0.1), "scan": (0.5, 0.05, 0.12, 0.5), "stations": (1.0, 0.06, 0.15, 0.7),
     "label": (4.0, 0.08, 0.15, 1.0), "reference": (0.3, 0.03, 0.10, 0.3),
 }  # fmt: skip
+LABELLED = _SD["label"]
+"""Standard deviations of a blade of which a label is all that is known, in the order and units of `NAMES`."""
 # Heavy tail: factors on all of them, with their probabilities.
 _SIZES, _WEIGHTS = (0.8, 1.2, 2.2), (0.5, 0.4, 0.1)
 # Blade angles within which a pitch means something [rad].
@@ -93,7 +95,7 @@ class CalibratedBlade:
         return self.kind(*map(float, z))
 
 
-PLAIN = CalibratedBlade(np.zeros(len(NAMES)), np.zeros(len(NAMES)), np.diag(_PLAIN))
+PLAIN = CalibratedBlade(np.zeros(len(NAMES)), np.zeros(len(NAMES)), np.diag(AS_BUILT))
 """Blade of the case as it is written."""
 
 

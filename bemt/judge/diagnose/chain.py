@@ -108,7 +108,9 @@ def _diagnose(
     absent |= dict.fromkeys(given.ruled_out, "ruled out by a check")
     problem, candidates = ask_reference(problem, candidates)
     say("weighing explanations")
-    found = posterior.weigh(problem, candidates)
+    every = effects.catalogue()
+    gone = given.ruled_out if only is None else [*given.ruled_out, *(i for i in every if i not in only)]
+    found = posterior.weigh(problem, candidates, gone=gone)
     change = ratios(absent.keys()) if any(p.record.reference for p in problem.parts) else None
     found = replace(found, probability=knowledge.combined(found, change))
     P = _of_motor(found)
@@ -240,7 +242,8 @@ def _settling(found: posterior.Evidence, decision: loss.Decision, best: fitting.
     if decision.verdict == "none":
         faint = rivals_of(["", *singles][:_MOST_RIVALS])
         return suggestion.nothing_called_for(found, faint, found.probability[UNKNOWN])
-    if decision.verdict == "insufficient" and (mend := other_rotor.to_mend(found.problem)):
+    doubted = decision.by == "files"
+    if decision.verdict == "insufficient" and (mend := other_rotor.to_mend(found.problem, doubted)):
         return suggestion.mended(found, mend)
     if not singles:
         return suggestion.Suggestion(suggestion.REFERENCE, (), (), 0.0, 0.0, "reference")

@@ -291,7 +291,7 @@ def headline(d: Diagnosis) -> str:
     """What an engineer would say first."""
     said = d.said
     off = _off(d)
-    if said.verdict == "insufficient" and other_rotor.foreign(d.problem):
+    if said.verdict == "insufficient" and (other_rotor.foreign(d.problem) or said.by == "files"):
         return f"These are not the loads of this case ({off}): check diameter, blades, units and speed first."
     file, wrong, _ = other_rotor.contradiction(d.problem)
     if file and said.verdict == "insufficient":

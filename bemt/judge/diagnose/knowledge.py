@@ -108,9 +108,9 @@ def kinds(problem: Problem) -> Mapping[str, float]:
 def log_priors(
     weights: dict[str, float], pairs: bool = True, of: Mapping[str, float] = PRIOR
 ) -> dict[Explanation, float]:  # fmt: skip
-    """Logarithm of the prior probability of every explanation; `of`: of their kinds."""
+    """Logarithm of the prior probability of every explanation; `of`: of their kinds. Another rotor is one effect."""
     total = sum(weights.values()) or 1.0
-    out = {NONE: of["none"], UNKNOWN: of["unknown"]}
+    out = {NONE: of["none"], UNKNOWN: of["unknown"], DOUBT: of["single"] / total}
     out |= {Explanation.of(i): of["single"] * w / total for i, w in weights.items()}
     if pairs:
         names = list(weights)
@@ -219,7 +219,8 @@ def _doubted(problem: Problem, P: Mapping[Explanation, float]) -> dict[Explanati
         lost = {UNKNOWN: share * P[UNKNOWN]}
     else:
         return dict(P)
-    return {**{k: p - lost.get(k, 0.0) for k, p in P.items()}, DOUBT: sum(lost.values())}
+    out = {k: p - lost.get(k, 0.0) for k, p in P.items()}
+    return out | {DOUBT: P.get(DOUBT, 0.0) + sum(lost.values())}
 
 
 def _by_level(P: Mapping[Explanation, float], level: Mapping[str, float]) -> dict[Explanation, float]:
@@ -229,7 +230,7 @@ def _by_level(P: Mapping[Explanation, float], level: Mapping[str, float]) -> dic
     weight = {Explanation.of(i): level[i] for i in other_rotor.SLIPS if i in level and Explanation.of(i) in P}
     weight[DOUBT] = max(DOUBTFUL * level.get("", 0.0), 1e-12)
     slips = {k for k in P if k.ids & set(other_rotor.SLIPS)}
-    out = {k: 0.0 if k in slips else p / (1.0 + DOUBTFUL) for k, p in P.items()}
+    out = {k: 0.0 if k in slips else p / (1.0 + DOUBTFUL) for k, p in P.items() if not k.doubt}
     rest = 1.0 - sum(out.values())
     return out | {k: rest * w / sum(weight.values()) for k, w in weight.items()}
 

@@ -83,13 +83,19 @@ def _everywhere(problem: Problem, extra: Effect, where_on: bool = False) -> Arra
     return np.concatenate(full)[problem.kept]
 
 
+def blade_tangents(problem: Problem) -> Array:
+    """Change of the readings for each latent number of the blade that is not certain, (M, K) [unit/unit of `NAMES`]."""
+    tangents = np.zeros((problem.y.size, problem.blade.at.size))
+    for k in problem.blade.used:
+        up, down = (_everywhere(problem, problem.blade.changed(int(k), s * STEP[k])) for s in (1.0, -1.0))
+        tangents[:, k] = (up - down) / (2.0 * STEP[k]) * problem.stretch
+    return tangents
+
+
 def _of_blade(problem: Problem, add: Add) -> Array:
     """What is open of the blade; gives the offset of the readings from its mean."""
     blade, offset = problem.blade, np.zeros_like(problem.y)
-    tangents = np.zeros((problem.y.size, blade.at.size))
-    for k in blade.used:
-        up, down = (_everywhere(problem, blade.changed(int(k), s * STEP[k])) for s in (1.0, -1.0))
-        tangents[:, k] = (up - down) / (2.0 * STEP[k]) * problem.stretch
+    tangents = blade_tangents(problem)
     if np.isfinite(tangents).all():
         offset = tangents @ (blade.at - blade.mean)
         for j in range(blade.root.shape[1]):

@@ -8,21 +8,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bemt.base import unit_errors
+from bemt.base.arrays import Array
+from bemt.base.gaussian.evidence import LinearTerms, log_sum
 from bemt.base.tables import number_text
 from bemt.base.units import INCH
-from bemt.judge.diagnose.blade import AsLabelled
+from bemt.judge.diagnose.blade import AS_BUILT, LABELLED, AsLabelled
 from bemt.judge.diagnose.form import ALIKE
+from bemt.judge.diagnose.nuisance import blade_tangents
 from bemt.judge.diagnose.record import CHANNELS
+from bemt.judge.explanation import DOUBT, Explanation
 from bemt.physics.effects.base import Effect, RotorBuild
+from bemt.physics.effects.propeller import AnotherPropeller
 from bemt.rotors.as_measured import FACTOR
 
 if TYPE_CHECKING:
+    from bemt.base.gaussian.whitening import Conditional
     from bemt.data.recordings.findings import Finding
     from bemt.judge.diagnose.problem import Problem
     from bemt.physics.effects.base import Effect, RotorBuild
@@ -34,6 +40,12 @@ _OFF = 0.25
 _SHOWN = 3
 # Diameters of propellers that a stand takes, 5 to 15 in: standard deviation of the natural logarithm.
 _SIZES = 0.35
+# Diameters differ from their labels by a share of this.
+_ROUNDED = 0.01
+# Fewest advance ratios that a curve is drawn through.
+_NODES = 4
+# Blade area of propellers of one diameter, two blades or three: the same.
+_AREA = 0.2
 _ANGLES_DEG = (-12.0, -9.0, -6.0, -3.0, 3.0, 6.0, 9.0, 12.0, 16.0)
 # Kinds of slips that are another rotor.
 _ROTORS = ("pitch", "chord", "diameter", "blades")
@@ -142,6 +154,82 @@ def by_level(problem: Problem) -> dict[str, float]:
     return out
 
 
+@dataclass(frozen=True, eq=False)
+class Another:
+    """Another rotor in the place of the case's: what its size changes, and what else is not known of it."""
+
+    changes: Array  # (M, G) Of the readings, by diameter [units of the readings]
+    log_w: Array  # (G,) Logarithm of the prior weight of each diameter [1]
+    open: Array  # (G, M, K) One standard deviation each of blade area, pitch and section [units of the readings]
+
+    @classmethod
+    def of(cls, problem: Problem) -> tuple[Explanation, Another] | None:
+        """What it is, another propeller than the reference's or doubt of the case, and its signatures; None by laws.
+
+        Similar rotors have one CT(J) and one CP(J), so that loads go with D^4 and D^5 at V/(n D); what Reynolds and
+        Mach number change with the size is less than what else is open.
+        """
+        solved = all(p.instead is None for p in problem.parts)
+        if problem.by_laws or np.any(problem.channel > 1) or not solved:
+            return None
+        size = _sizes(problem)
+        base = np.tile(problem.f0, (size.size, 1))
+        if any(np.any(p.flow.V != 0.0) for p in problem.parts):
+            from scipy.interpolate import CubicSpline
+
+            nodes = 0.25 * _SIZES * np.arange(-12.0, 13.0)
+            table = np.stack([_at_other_advance(problem, k) for k in nodes])
+            good = np.isfinite(table).all(axis=1)
+            nodes, table = nodes[good], table[good]
+            if nodes.size < _NODES:
+                return None
+            size = size[(size >= nodes[0]) & (size <= nodes[-1])]
+            base = CubicSpline(nodes, table)(size)
+        free = problem.free
+        scale = np.exp(np.where(problem.channel == 0, 4.0, 5.0) * size[:, None])
+        blade = np.nan_to_num(blade_tangents(problem))
+        changes = np.where(free, scale * base - problem.f0, 0.0).T
+        log_w = -0.5 * (size / _SIZES) ** 2
+        apart = np.abs(size) > 1.5 * _ROUNDED
+        area = np.zeros_like(problem.f0)
+
+        def open_(columns: Array) -> Array:
+            return scale[:, :, None] * np.where(free[:, None], columns, 0.0)
+
+        other = open_(np.column_stack([_AREA * problem.f0, blade * LABELLED]))
+        alike = open_(np.column_stack([area, blade * (LABELLED[0], *AS_BUILT[1:])]))[apart]
+        weight = np.concatenate([log_w - log_sum(log_w), log_w[apart] - log_sum(log_w[apart])]) - math.log(2.0)
+        another = cls(np.concatenate([changes, changes[:, apart]], axis=1), weight, np.concatenate([other, alike]))
+        return DOUBT if free.all() else Explanation.of(AnotherPropeller.id), another
+
+    def log_bayes(self, white: Conditional, residual: Array) -> float:
+        """Natural logarithm of the odds over none for whitened readings (N,) [1]."""
+        left = residual[:, None] - white.changes(self.changes)
+        out = []
+        for e, columns in zip(left.T, self.open, strict=True):
+            out.append(float(LinearTerms.of(white.changes(columns)).gain(e)) - 0.5 * float(e @ e))
+        return float(log_sum(out, self.log_w)) + 0.5 * float(residual @ residual)
+
+
+def _sizes(problem: Problem) -> Array:
+    """Logarithm of diameters over the case's: half inches from it, as propellers come, about as true as labels are.
+
+    In a duct there is room for one diameter.
+    """
+    part = next(p for p in problem.parts if not p.record.reference)
+    D = 2.0 * part.flow.R
+    steps = 1.0 + 0.5 * INCH / D * np.arange(-200.0, 201.0)
+    sizes = np.log(steps[(steps > math.exp(-3.0 * _SIZES)) & (steps < math.exp(3.0 * _SIZES))])
+    sizes = np.zeros(1) if part.model.duct is not None else sizes
+    return np.sort((sizes[:, None] + _ROUNDED * np.array([-1.0, -0.5, 0.0, 0.5, 1.0])).ravel())
+
+
+def _at_other_advance(problem: Problem, size: float) -> Array:
+    """Readings of the baseline at the advance ratio of a rotor whose diameter is exp(size) times the case's, (M,)."""
+    slower = (replace(p, flow=replace(p.flow, V=p.flow.V * math.exp(-size)), _solved={}) for p in problem.parts)
+    return np.concatenate([p.predict(p.baseline) for p in slower])[problem.kept]
+
+
 def nearest_rotors(problem: Problem) -> str:
     """Rotors that would fit the level of the loads, nearest first: another pitch, chord, diameter or blade count."""
     found = {c: math.log(abs(v)) for c, v in levels(problem).items() if v}
@@ -241,13 +329,15 @@ def finding(problem: Problem) -> str:
     return f"{off} what the case gives. Is it this rotor? Most likely: {ranked}"
 
 
-def to_mend(problem: Problem) -> str:
+def to_mend(problem: Problem, doubted: bool = False) -> str:
     """What comes before any run: whose rotor it is, or what cannot be so; "" where nothing is wrong."""
     if _suspicious(levels(problem)):
         slips = "; ".join(f"{k}. {s.words}" for k, s in enumerate(suspects(problem)[:_SHOWN], 1))
         return f"check that the case describes this rotor; other explanations for the loads: {slips}"
     file, _, correction = contradiction(problem)
-    return f"correct {file} before any run: {correction}" if file else ""
+    if file:
+        return f"correct {file} before any run: {correction}"
+    return f"check diameter, pitch and blades of the case; nearest: {nearest_rotors(problem)}" if doubted else ""
 
 
 def contradiction(problem: Problem) -> tuple[str, str, str]:

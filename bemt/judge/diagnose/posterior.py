@@ -7,6 +7,7 @@ effect's law is a few more columns of that covariance, by Woodbury.  What else i
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -21,7 +22,8 @@ from bemt.base.gaussian.evidence import log_sum, shares
 from bemt.base.gaussian.whitening import conditional
 from bemt.judge.diagnose import form, knowledge, noise
 from bemt.judge.diagnose.form import State
-from bemt.judge.explanation import NONE, UNKNOWN, Explanation
+from bemt.judge.diagnose.other_rotor import Another
+from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation
 from bemt.physics import effects
 from bemt.physics.effects import base as effect_base
 
@@ -129,10 +131,14 @@ class _Bank:
         return self._columns[name, setting]
 
 
-def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True) -> Evidence:
-    """Weigh all explanations."""
+def weigh(
+    problem: Problem, candidates: Sequence[Candidate], pairs: bool = True, gone: Collection[str] = ()
+) -> Evidence:  # fmt: skip
+    """Weigh all explanations but those that are ``gone``, ruled out; candidates are without them."""
     bank = _Bank.of(problem, candidates)
     rivals = noise.rivals(problem, _told(candidates))
+    other = Another.of(problem)
+    other = other if other and other[0].ids.isdisjoint(gone) else None
     states = []
     for h in _leading(bank):
         C = noise.covariance(problem, h)
@@ -146,10 +152,16 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
             for where, some in ((state.log_z, counts), (state.small, ~counts)):
                 share = float(log_sum(gains[some])) - float(np.log(gains.size)) if some.any() else _SHUT
                 where[UNKNOWN] = state.log_z[NONE] + share
+        if other is not None:
+            state.log_z[other[0]] = state.log_z[NONE] + other[1].log_bayes(state.white, state.r)
         if pairs:
             _pairs(bank, state)
         states.append(state)
-    before = knowledge.log_priors(knowledge.prior_weights(problem, list(bank.spans)), pairs, knowledge.kinds(problem))
+    weights = knowledge.prior_weights(problem, list(bank.spans))
+    before = knowledge.log_priors(weights, pairs, knowledge.kinds(problem))
+    if other is not None:  # a single one, which stands in no pair
+        weight = knowledge.prior_weights(problem, list(other[0]))
+        before[other[0]] = before[DOUBT] + sum(map(math.log, weight.values()))
     rough = {c.id for c in candidates if problem.by_laws and effects.catalogue()[c.id].kind != "stand"
              and not effects.catalogue()[c.id].exact}  # fmt: skip
     probability = _posterior(states, before, rough)
