@@ -224,6 +224,8 @@ def _commands(chosen: suggestion.Suggestion, given: suggestion.Given) -> tuple[s
         return given.of_days()
     if chosen.kind == "rotor":
         return f"bemt lab calibrate-rotor REFERENCE {given.rest}", given.command(reference="REFERENCE")
+    if chosen.kind == "case":
+        return (replace(given, rest="--case LABEL").command(),)
     if chosen.kind == "mend":
         return tuple(f"bemt import {f}" for f in given.recordings)
     return ()
@@ -242,9 +244,10 @@ def _settling(found: posterior.Evidence, decision: loss.Decision, best: fitting.
     if decision.verdict == "none":
         faint = rivals_of(["", *singles][:_MOST_RIVALS])
         return suggestion.nothing_called_for(found, faint, found.probability[UNKNOWN])
-    doubted = decision.by == "files"
-    if decision.verdict == "insufficient" and (mend := other_rotor.to_mend(found.problem, doubted)):
+    if decision.verdict == "insufficient" and (mend := other_rotor.to_mend(found.problem)):
         return suggestion.mended(found, mend)
+    if other_rotor.doubted(found.problem, decision):
+        return suggestion.mended(found, suggestion.WHOSE, "case")
     if not singles:
         return suggestion.Suggestion(suggestion.REFERENCE, (), (), 0.0, 0.0, "reference")
     if decision.verdict == "insufficient" and (note := suggestion.weather(found)):

@@ -220,16 +220,18 @@ def explanation(d: Diagnosis) -> list[str]:
     off = " and ".join(
         f"{_CHANNEL[c].lower()} by {_share(v) if abs(v) > 1.0 else f'{v:+.0%}'}" for c, v in level.items()
     )
-    alone = d.problem.free.all()
+    alone, doubted = d.problem.free.all(), other_rotor.doubted(d.problem, decision)
     if alone and not d.problem.findings and level and min(abs(v) for v in level.values()) > _ANOTHER_ROTOR:
-        lines.append(f"Your rotor is far from the case ({off}). Check diameter, pitch and blades "
-                     f"first. Nearest: {other_rotor.nearest_rotors(d.problem)}.")  # fmt: skip
+        far = "" if doubted else f"Your rotor is far from the case ({off}). Check diameter, pitch and " \
+                                                "blades first. "  # fmt: skip
+        lines.append(f"{far}Nearest rotors: {other_rotor.nearest_rotors(d.problem)}.")
     if decision.verdict == "none":
         lines.append(f"Why: {decision.why}.")
         if max((abs(v) for v in level.values()), default=0.0) > _WORTH_SAYING:
             lines.append(f"The level is off ({off}), within what gain, blade angle and solver allow; no cause shows.")
         return [*lines, _gain(d), *_next(d), *_not_tried(d)]
-    lines += _unexplained(d) if decision.verdict in ("unknown", "insufficient") else [_where(d.where)]
+    known = decision.verdict not in ("unknown", "insufficient") or doubted
+    lines += [_where(d.where)] if known else _unexplained(d)
     if decision.verdict in ("named", "sensor"):
         told = _parameters(d)
         lines.append(
@@ -264,7 +266,7 @@ def _next(d: Diagnosis) -> list[str]:
     cost = ""
     if step.minutes and step.gain:
         cost = f" About {step.minutes:.0f} minutes; expected to settle {step.gain:.0%} of what is open."
-    case = "if nothing is wrong with it" if step.kind == "mend" else "without such a reference"
+    case = "if nothing is wrong with it" if step.kind in ("mend", "case") else "without such a reference"
     other = [] if step.otherwise is None or step.kind == "run" else [f"  {case}: {step.otherwise.text}"]
     unless = [f"  if {step.checks} is ruled out:"] if step.checks and step.commands else []
     return [f"Next: {step.text}{step.tells}.{cost}", *unless, *(f"  {c}" for c in step.commands), *other]
@@ -289,9 +291,8 @@ def _title(name: str) -> str:
 
 def headline(d: Diagnosis) -> str:
     """What an engineer would say first."""
-    said = d.said
-    off = _off(d)
-    if said.verdict == "insufficient" and (other_rotor.foreign(d.problem) or said.by == "files"):
+    said, off, doubted = d.said, _off(d), other_rotor.doubted(d.problem, d.said)
+    if said.verdict == "insufficient" and (other_rotor.foreign(d.problem) or doubted):
         return f"These are not the loads of this case ({off}): check diameter, blades, units and speed first."
     file, wrong, _ = other_rotor.contradiction(d.problem)
     if file and said.verdict == "insufficient":
@@ -409,7 +410,7 @@ def _tables(d: Diagnosis) -> list[str]:
     for name, p in sorted(found.probability.items(), key=lambda kv: -kv[1])[:_SHOWN]:
         seen = f"{size[str(name)]:.1f}" if str(name) in size else "-"
         odds = "-" if name not in found.states[0].log_z else f"{found.log_bayes(name):.1f}"
-        rows.append([str(name), f"{p:.3f}", odds, seen])
+        rows.append(["another rotor or file" if name.doubt else str(name), f"{p:.3f}", odds, seen])
     out = [
         "",
         text_table(

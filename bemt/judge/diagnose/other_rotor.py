@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from bemt.base.gaussian.whitening import Conditional
     from bemt.data.recordings.findings import Finding
     from bemt.judge.diagnose.problem import Problem
+    from bemt.judge.loss import Decision
     from bemt.physics.effects.base import Effect, RotorBuild
 
 UNREPEATABLE = 0.10
@@ -230,6 +231,11 @@ def _at_other_advance(problem: Problem, size: float) -> Array:
     return np.concatenate([p.predict(p.baseline) for p in slower])[problem.kept]
 
 
+def doubted(problem: Problem, said: Decision) -> bool:
+    """Whether it is the rotor of the case that is in doubt, and not a file."""
+    return said.by == "files" and not contradiction(problem)[0] and not unrepeatable(problem)
+
+
 def nearest_rotors(problem: Problem) -> str:
     """Rotors that would fit the level of the loads, nearest first: another pitch, chord, diameter or blade count."""
     found = {c: math.log(abs(v)) for c, v in levels(problem).items() if v}
@@ -329,15 +335,13 @@ def finding(problem: Problem) -> str:
     return f"{off} what the case gives. Is it this rotor? Most likely: {ranked}"
 
 
-def to_mend(problem: Problem, doubted: bool = False) -> str:
+def to_mend(problem: Problem) -> str:
     """What comes before any run: whose rotor it is, or what cannot be so; "" where nothing is wrong."""
     if _suspicious(levels(problem)):
         slips = "; ".join(f"{k}. {s.words}" for k, s in enumerate(suspects(problem)[:_SHOWN], 1))
         return f"check that the case describes this rotor; other explanations for the loads: {slips}"
     file, _, correction = contradiction(problem)
-    if file:
-        return f"correct {file} before any run: {correction}"
-    return f"check diameter, pitch and blades of the case; nearest: {nearest_rotors(problem)}" if doubted else ""
+    return f"correct {file} before any run: {correction}" if file else ""
 
 
 def contradiction(problem: Problem) -> tuple[str, str, str]:

@@ -37,6 +37,9 @@ REFERENCE = (
 )
 """The run that settles most: it shows how far model and stand differ anyway."""
 
+WHOSE = "state the rotor that was measured: its label, or its diameter, pitch and blades in the case"
+"""Where another rotor fits the readings better than that of the case."""
+
 ROTOR = (
     "measure diameter and pitch and count the blades; with a run that is known to be right, calibrate the rotor and "
     "diagnose again with that run as reference"
@@ -100,7 +103,7 @@ class Suggestion:
     before: float
     after: float
     # "run", "reference" (a run without the cause), "look" (a check or a correction without a run), "mend" (the
-    # recording), "air" (write it down), "cfd" (compute again), or "" when nothing is called for
+    # recording), "case" (state the rotor), "air" (write it down), "cfd" (compute again), or "" for nothing
     kind: str = "run"
     commands: tuple[str, ...] = ()  # What to type then; after a check, if the effect is not there
     checks: str = ""  # Effect that a check looks for
@@ -271,11 +274,11 @@ def nothing_called_for(found: Evidence, rivals: Sequence[Rival], unknown: float)
     return Suggestion(text, (), (), 0.0, 0.0, "reference", otherwise=run)
 
 
-def mended(found: Evidence, what: str) -> Suggestion:
+def mended(found: Evidence, what: str, kind: str = "mend") -> Suggestion:
     """Put the recording right; where nothing is wrong with it, only a reference shows what else it may be."""
     known = _referenced(found) or found.problem.parts[0].record.computed
     reference = None if known else Suggestion(REFERENCE, (), (), 0.0, 0.0, "reference")
-    return Suggestion(what, (), (), 0.0, 0.0, "mend", otherwise=reference)
+    return Suggestion(what, (), (), 0.0, 0.0, kind, otherwise=reference)
 
 
 def weather(found: Evidence) -> Suggestion | None:

@@ -190,7 +190,7 @@ def _recommended(item: _Item, answer: ToldAnswer) -> _Taken | str:
     if step.kind == "look" and not step.checks:  # of a class, the fault that is sure is to be put right
         return _put_aside(item, [s[0] for s in answer.sets if len(s) == 1 and _at_the_stand(s[0])], False)
     taken = _step(item, step)
-    if taken in ("no reference", "no run", "mend") and step.otherwise:
+    if taken in ("no reference", "no run", "mend", "case") and step.otherwise:
         taken = _step(item, step.otherwise)
     return "none" if answer.verdict == "none" and taken == "no run" else taken
 
