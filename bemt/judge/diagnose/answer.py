@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.judge.diagnose import fit as fitting
-from bemt.judge.diagnose import knowledge
 from bemt.judge.diagnose.record import CHANNELS
 from bemt.judge.explanation import UNKNOWN, Explanation, Sizes
 from bemt.judge.loss import Decision
@@ -223,8 +222,7 @@ class Diagnosis:
     @property
     def prior(self) -> dict[Explanation, float]:
         """Probability of every explanation before a reading was looked at [1]."""
-        weights = knowledge.prior_weights(self.problem, list(self.found.spans))
-        return {k: float(np.exp(v)) for k, v in knowledge.log_priors(weights, of=knowledge.kinds(self.problem)).items()}
+        return self.found.prior
 
     @property
     def explanations(self) -> tuple[Candidate, ...]:

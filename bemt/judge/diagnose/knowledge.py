@@ -106,12 +106,16 @@ def kinds(problem: Problem) -> Mapping[str, float]:
 
 
 def log_priors(
-    weights: dict[str, float], pairs: bool = True, of: Mapping[str, float] = PRIOR
+    weights: dict[str, float], pairs: bool = True, of: Mapping[str, float] = PRIOR,
+    alone: Mapping[Explanation, float] | None = None,
 ) -> dict[Explanation, float]:  # fmt: skip
-    """Logarithm of the prior probability of every explanation; `of`: of their kinds. Another rotor is one effect."""
-    total = sum(weights.values()) or 1.0
-    out = {NONE: of["none"], UNKNOWN: of["unknown"], DOUBT: of["single"] / total}
-    out |= {Explanation.of(i): of["single"] * w / total for i, w in weights.items()}
+    """Logarithm of the prior probability of every explanation, of effects and of what stands ``alone``, in no pair.
+
+    ``of``: of their kinds.
+    """
+    single = {Explanation.of(i): w for i, w in weights.items()} | dict(alone or {})
+    total = sum(single.values()) or 1.0
+    out = {NONE: of["none"], UNKNOWN: of["unknown"]} | {k: of["single"] * w / total for k, w in single.items()}
     if pairs:
         names = list(weights)
         both = {Explanation.of(a, b): weights[a] * weights[b] for k, a in enumerate(names) for b in names[k + 1 :]}

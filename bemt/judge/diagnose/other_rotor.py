@@ -161,7 +161,7 @@ class Another:
 
     changes: Array  # (M, G) Of the readings, by diameter [units of the readings]
     log_w: Array  # (G,) Logarithm of the prior weight of each diameter [1]
-    open: Array  # (G, M, K) One standard deviation each of blade area, pitch and section [units of the readings]
+    unknown: Array  # (G, M, K) One standard deviation each of blade area, pitch and section [units of the readings]
 
     @classmethod
     def of(cls, problem: Problem) -> tuple[Explanation, Another] | None:
@@ -207,7 +207,7 @@ class Another:
         """Natural logarithm of the odds over none for whitened readings (N,) [1]."""
         left = residual[:, None] - white.changes(self.changes)
         out = []
-        for e, columns in zip(left.T, self.open, strict=True):
+        for e, columns in zip(left.T, self.unknown, strict=True):
             out.append(float(LinearTerms.of(white.changes(columns)).gain(e)) - 0.5 * float(e @ e))
         return float(log_sum(out, self.log_w)) + 0.5 * float(residual @ residual)
 

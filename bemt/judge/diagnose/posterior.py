@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations
 from typing import TYPE_CHECKING
 
@@ -23,7 +23,7 @@ from bemt.base.gaussian.whitening import conditional
 from bemt.judge.diagnose import form, knowledge, noise
 from bemt.judge.diagnose.form import State
 from bemt.judge.diagnose.other_rotor import Another
-from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation
+from bemt.judge.explanation import NONE, UNKNOWN, Explanation
 from bemt.physics import effects
 from bemt.physics.effects import base as effect_base
 
@@ -69,6 +69,7 @@ class Evidence:
     spans: dict[str, slice]  # Columns of each candidate in ``State.S``
     log_w: Array  # (G,) Logarithm of the prior weight of each column within its candidate [1]
     rivals: tuple[SmoothAlternative, ...] = ()  # Unknown smooth effects
+    prior: dict[Explanation, float] = field(default_factory=dict)  # Probability before the readings [1]
 
     @property
     def p_value(self) -> float:
@@ -158,16 +159,15 @@ def weigh(
             _pairs(bank, state)
         states.append(state)
     weights = knowledge.prior_weights(problem, list(bank.spans))
-    before = knowledge.log_priors(weights, pairs, knowledge.kinds(problem))
-    if other is not None:  # a single one, which stands in no pair
-        weight = knowledge.prior_weights(problem, list(other[0]))
-        before[other[0]] = before[DOUBT] + sum(map(math.log, weight.values()))
+    alone = {} if other is None else {other[0]: math.prod(knowledge.prior_weights(problem, list(other[0])).values())}
+    before = knowledge.log_priors(weights, pairs, knowledge.kinds(problem), alone)
     rough = {c.id for c in candidates if problem.by_laws and effects.catalogue()[c.id].kind != "stand"
              and not effects.catalogue()[c.id].exact}  # fmt: skip
     probability = _posterior(states, before, rough)
     likeliest = max(probability, key=lambda k: probability[k])
     states.sort(key=lambda s: -(s.log_z[likeliest] + np.log(s.hyper.weight)))
-    return Evidence(problem, tuple(candidates), tuple(states), probability, bank.spans, bank.log_w, rivals)
+    prior = {k: math.exp(v) for k, v in before.items()}
+    return Evidence(problem, tuple(candidates), tuple(states), probability, bank.spans, bank.log_w, rivals, prior)
 
 
 def log_odds(problem: Problem, candidates: Sequence[Candidate]) -> dict[str, float]:
