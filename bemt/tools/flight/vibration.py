@@ -34,8 +34,8 @@ _FLOOR = {"m/s2": 0.2, "rad/s": 0.02}
 class Vibration:
     """What the accelerometer shows of the rotors."""
 
-    rate_hz: float  # Samples a second; NaN without an accelerometer or gyro [Hz]
-    shaft_hz: float  # Mean speed of the rotors; NaN without speeds [Hz]
+    rate_hz: float = float("nan")  # Samples a second; NaN without an accelerometer or gyro [Hz]
+    shaft_hz: float = float("nan")  # Mean speed of the rotors; NaN without speeds [Hz]
     # Of each rotor at once and at twice a turn; NaN where it is above the Nyquist frequency or not told apart [`unit`]
     amplitude: tuple[float, ...] = ()
     blade: tuple[float, ...] = ()
@@ -69,7 +69,7 @@ def _found(log: FlightLog) -> Vibration:
     if not shaft > 1.0:
         speeds, shaft = None, float("nan")
     if log.raw is None or log.raw[0].size < 2:
-        return Vibration(float("nan"), shaft, missing="no accelerometer in the log")
+        return Vibration(shaft_hz=shaft, missing="no accelerometer in the log")
     t, v = log.raw
     step = float(np.median(np.diff(t)))
     rate = 1.0 / step

@@ -46,9 +46,9 @@ _GRID, _LOG_C = (401, 31, 41), 1.1  # points over wind, r and c; half the range 
 class Wind:
     """Wind along the mean force: speed, 95 % half width [m/s], heading from x [deg]; why it is missing."""
 
-    speed: float
-    half: float
-    heading_deg: float
+    speed: float = float("nan")
+    half: float = float("nan")
+    heading_deg: float = float("nan")
     missing: str = ""
 
 
@@ -61,9 +61,9 @@ def wind(log: FlightLog, calm: Sequence[FlightLog]) -> Wind:
     mine = _horizontal(log, by_force)
     still = [found for one in calm if (found := _horizontal(one, by_force)) is not None]
     if mine is None:
-        return Wind(np.nan, np.nan, np.nan, "no velocity, or neither attitude nor residual force")
+        return Wind(missing="no velocity, or neither attitude nor residual force")
     if not still:
-        return Wind(np.nan, np.nan, np.nan, "give a calm flight of the same vehicle with --healthy; move to and fro")
+        return Wind(missing="give a calm flight of the same vehicle with --healthy; move to and fro")
     force, velocity = mine
     mean = force.mean(axis=0) - np.mean([f.mean(axis=0) for f, _ in still], axis=0)
     size = float(np.hypot(*mean))
@@ -75,7 +75,7 @@ def wind(log: FlightLog, calm: Sequence[FlightLog]) -> Wind:
     c, u_c = float(weight @ [s for s, _ in own]) / total, total**-0.5
     if not c > 2.0 * u_c:
         why = "the force does not depend on the velocity in the calm flights: fly one to and fro along the wind"
-        return Wind(np.nan, np.nan, heading, why)
+        return Wind(heading_deg=heading, missing=why)
     zeros = np.array([f.mean(axis=0) @ axis for f, _ in still])
     u_zero = 0.5 * abs(float(zeros[0])) if zeros.size == 1 else float(zeros.std(ddof=1) / np.sqrt(zeros.size))
     u_still = float(np.mean([u_of_mean(f @ axis) for f, _ in still]))
