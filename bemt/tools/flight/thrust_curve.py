@@ -255,6 +255,6 @@ def _misfit(t: Array, drive: Array | None, rpm: Array, tau: float, step: float, 
         lagged, _ = lfilter([1.0 - keep], [1.0, -keep], drive, zi=[keep * drive[0]])
         columns.append(lagged[part])
     X = np.column_stack(columns)
-    scale = np.maximum(np.abs(X).max(axis=0), 1e-12)
-    fit = (X / scale) @ np.linalg.lstsq(X / scale, rpm[part], rcond=None)[0]
-    return float(np.sum((rpm[part] - fit) ** 2))
+    X /= np.maximum(np.abs(X).max(axis=0), 1e-12)
+    found = np.linalg.lstsq(X.T @ X, X.T @ rpm[part], rcond=None)[0]  # the long matrix takes seconds
+    return float(np.sum((rpm[part] - X @ found) ** 2))
