@@ -11,7 +11,6 @@ from flight_files import Hover, broken_copies, dataflash, ulog
 from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.tools.flight import log as flight_log
-from bemt.tools.flight import px4
 from bemt.tools.flight.answer import FlightAnswer, answer_on
 from bemt.tools.flight.change import change_in
 from bemt.tools.flight.judge import judge
@@ -200,7 +199,6 @@ def test_a_long_log_keeps_its_stretches(tmp_path: Path, monkeypatch: pytest.Monk
     whole = {k: read(tmp_path, k, flight, **m) for k, m in (("ardupilot", {"imu_hz": 1000.0}), ("px4", {"fifo": True}))}
     monkeypatch.setattr(flight_log, "DENSE", 50_000)
     monkeypatch.setattr("bemt.tools.flight.ardupilot._CHUNK", 1 << 18)
-    monkeypatch.setattr(px4, "_LONG", 0)
     for kind, more in (("ardupilot", {"imu_hz": 1000.0}), ("px4", {"fifo": True})):
         thin, full = read(tmp_path, kind, flight, **more), whole[kind]
         assert thin.raw is not None and full.raw is not None and thin.command is not None and full.command is not None
@@ -229,11 +227,9 @@ def test_cut_copies_are_read_as_far_as_they_go(tmp_path: Path) -> None:
     for data in (dataflash(Hover(seconds=12.0)), ulog(Hover(seconds=12.0))):
         (tmp_path / "log").write_bytes(data[: len(data) // 3])
         assert 3.0 < read_log(tmp_path / "log").t[-1] < 10.0
-    broken = bytearray(dataflash(Hover(seconds=12.0)))
-    broken[40_000:40_050] = bytes([7]) * 50
-    (tmp_path / "log").write_bytes(broken)
-    log = read_log(tmp_path / "log")
-    assert "skipped" in log.ends and log.t[-1] > 11.0
+        (tmp_path / "log").write_bytes(data[:40_000] + bytes([7]) * 50 + data[40_050:])
+        log = read_log(tmp_path / "log")
+        assert "damaged" in log.ends and log.t[-1] > 11.0
 
 
 @pytest.mark.parametrize("count", [20, pytest.param(600, marks=pytest.mark.slow)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -141,6 +142,13 @@ def test_recorded_flights_of_another_day(shared_data: Path) -> None:
             assert both <= set(judge(x, [*small.values()], layout, day=0).said.effects), name
             days = [0] * len(calm) + [1] * len(small)
             assert both <= set(judge(x, [*calm, *small.values()], layout, days=days, day=1).said.effects), name
+
+
+def test_a_name_is_right_by_flights_of_other_sessions(project: Path) -> None:
+    """In 95 % or more, and the page says what the report does (reports/studies/flight_sessions.py)."""
+    found = re.search(r"when it names: (\d+) of (\d+)", (project / "reports" / "flight" / "sessions.txt").read_text())
+    assert found is not None and int(found[1]) >= 0.95 * int(found[2]) > 0.0
+    assert f"{found[1]} of {found[2]} names were right" in (project / "docs" / "flight_logs.md").read_text()
 
 
 def test_sessions_shape_the_prediction() -> None:

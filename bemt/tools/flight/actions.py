@@ -92,14 +92,10 @@ class FlightsAnswer(Answered):
 
     def csv(self) -> str:
         """The table as CSV."""
-        import csv
-        import io
+        from bemt.base.tables import csv_text
 
-        out = io.StringIO()
-        writer = csv.DictWriter(out, list(_HEADINGS), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows({k: "" if v is None else v for k, v in row.items()} for row in self.table())
-        return out.getvalue()
+        rows = self.table()
+        return csv_text(list(rows[0]), rows)
 
     def figure(self, flight: int = 0) -> bytes:
         """Picture of one flight, PNG."""
@@ -336,13 +332,6 @@ def _with_model(answer: FlightAnswer, case: str) -> FlightAnswer:
     return replace(answer, predicted=found)
 
 
-_HEADINGS = (
-    "file", "format", "rotors", "flying_s", "verdict", "effects", "look", "thrust_constant", "thrust_constant_half",
-    "thrust_constant_unit", "thrust_over", "mass_kg", "mass_half_kg", "hover_command", "sensors", "vibration_m_s2",
-    "wind_m_s",
-)  # fmt: skip
-
-
 def _row(a: FlightAnswer) -> dict[str, Any]:
     """One flight in the table; None where the log does not show it."""
     import numpy as np
@@ -374,8 +363,9 @@ def _row(a: FlightAnswer) -> dict[str, Any]:
 
 def _aligned(rows: Sequence[dict[str, Any]]) -> str:
     """The columns that a screen holds."""
-    heads = ("file", "rotors", "in the air", "verdict", "thrust over", "sensor")
-    cells = [heads]
+    from bemt.base.tables import text_table
+
+    cells = []
     for r in rows:
         k = r["thrust_constant"]
         half = "" if k is None else f"{100 * r['thrust_constant_half'] / k:.1f} %"
@@ -385,5 +375,5 @@ def _aligned(rows: Sequence[dict[str, Any]]) -> str:
         sensor = "" if not r["sensors"] else r["sensors"].removeprefix("The speed sensor of ")
         seconds = f"{r['flying_s'] or 0.0:.0f} s"
         cells.append((Path(r["file"]).name, str(r["rotors"] or ""), seconds, what, constant, sensor))
-    width = [max(len(row[i]) for row in cells) for i in range(len(heads))]
-    return "\n".join("  ".join(c.ljust(w) for c, w in zip(row, width, strict=True)).rstrip() for row in cells)
+    heads = ("file", "rotors", "in the air", "verdict", "thrust over", "sensor")
+    return text_table(heads, cells, range(len(heads)))

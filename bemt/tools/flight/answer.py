@@ -69,7 +69,7 @@ class FlightAnswer:
     limited: tuple[float, ...] = ()  # Share of the time at full command, of each motor [1]
     change: FlightChange | None = None  # A change within the flight
     # At the frequencies of the rotors
-    vibration: Vibration = field(default_factory=lambda: Vibration(float("nan"), float("nan")))
+    vibration: Vibration = field(default_factory=Vibration)
     shaken: tuple[tuple[int, float, bool], ...] = ()  # As :func:`bemt.tools.flight.vibration.shaken` gives it
     speeds: tuple[tuple[int, float], ...] = ()  # As :func:`bemt.tools.flight.speed_sensor.speed_changes` gives it
     inflow: Inflow | None = None  # Thrust over the flow
@@ -108,7 +108,8 @@ class FlightAnswer:
             "decision": {"verdict": j.said.verdict, "effects": list(j.said.effects),
                          "probability": j.said.probability, "sets": [list(s) for s in j.said.sets],
                          "why": j.said.why, "expected_loss": dict(j.said.loss)},
-            "ranking": [{"effect": str(e), "probability": p, **(j.found[e].document() if e in j.found else {})}
+            "ranking": [{"effect": str(e), "probability": p,
+                         **({"size": j.found[e].size, "half": j.found[e].half} if e in j.found else {})}
                         for e, p in sorted(j.probability.items(), key=lambda kv: -kv[1])[:12]],
             "next_measurement": j.next.document(),
             "error_rate": {"accused": j.accused, "healthy": j.healthy, "interval95": list(j.rate95),

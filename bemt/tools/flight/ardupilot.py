@@ -104,13 +104,10 @@ def read(path: Path) -> FlightLog:
         with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
             tables, ends = _tables(data, letters)
         found = {k: t.columns() for k, t in tables.items()}
-    except (ValueError, TypeError, MemoryError) as error:
-        raise InputError(Fault(name, "", f"a damaged log ({error})", "whole DataFlash messages")) from error
-    try:
         return _made(name, {k: v for k, v in found.items() if v}, ends)
-    except (TypeError, ValueError, KeyError) as error:
-        if isinstance(error, InputError):
-            raise
+    except InputError:
+        raise
+    except (ValueError, TypeError, KeyError, MemoryError) as error:
         raise InputError(Fault(name, "", f"a damaged log ({error})", "whole DataFlash messages")) from error
 
 

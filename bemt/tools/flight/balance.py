@@ -37,11 +37,6 @@ from bemt.base.arrays import Array
 from bemt.tools.flight.layout import effect_matrix
 from bemt.tools.flight.log import FlightLog
 
-__all__ = [
-    "ALARM", "BLADE", "BUILD", "DAY", "IMBALANCE", "LARGEST", "WEAK", "WEIGHT", "WIDE", "WIND", "HealthyFlight",
-    "at_equal_voltage", "axes_of", "battery_volts", "blade", "differ", "directions", "features", "healthy_flight",
-]  # fmt: skip
-
 ALARM = 0.01
 """Probability that a flag beside the balance (a speed, a shake, a change in flight) is raised where nothing is wrong
 [1]."""

@@ -15,6 +15,7 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.tools.flight.balance import ALARM, LARGEST, axes_of, directions
 from bemt.tools.flight.log import FlightLog
+from bemt.tools.flight.repeat import block_means
 
 _BLOCK_S, _EDGE_S, _BATCHES, _LONGEST = 0.5, 1.0, 10, 600  # block; least time on both sides [s]; batches; blocks
 _ALIKE = 2.0 * float(np.log(0.95 / 0.05))  # chi squares that differ by less leave a name open
@@ -97,22 +98,12 @@ def _blocks(log: FlightLog, drive: Array) -> tuple[Array, Array, Array] | None:
         return None
     t = log.t[on]
     width = max(_BLOCK_S, float(t[-1] - t[0]) / _LONGEST)
-    number = np.floor((t - t[0]) / width).astype(int)
-    count = np.bincount(number)
-    full = count >= max(0.5 * np.median(count[count > 0]), 2)
-
-    def mean(v: Array) -> Array:
-        return np.stack([np.bincount(number, weights=c)[full] / count[full] for c in v[on].T], axis=1)
-
-    values = mean(drive)
-    if full.sum() < 20 or not np.all(values > 0.0):
+    moving = np.zeros((log.t.size, 0)) if log.velocity is None else log.velocity
+    full, (values, other) = block_means(t, width, drive[on], moving[on])
+    if full.size < 20 or not np.all(values > 0.0):
         return None
-    other = np.zeros((int(full.sum()), 0))
-    if log.velocity is not None:
-        v = mean(log.velocity)
-        other = v - v.mean(axis=0)
-        other = other[:, np.ptp(other, axis=0) > 0.2]
-    return t[0] + width * (np.flatnonzero(full) + 0.5), values, other
+    other = other - other.mean(axis=0)
+    return t[0] + width * (full + 0.5), values, other[:, np.ptp(other, axis=0) > 0.2]
 
 
 # Evidence of a cause in the balance: Student's density of what it leaves, over all sizes that it may have.
@@ -141,10 +132,6 @@ class FlightEvidence:
     # Natural logarithm of its density, and of the part of it that healthy flights hide
     log: float
     log_small: float = float("-inf")
-
-    def document(self) -> dict[str, float]:
-        """What JSON gives of it."""
-        return {"size": self.size, "half": self.half}
 
 
 @dataclass(frozen=True, eq=False)

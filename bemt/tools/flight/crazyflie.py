@@ -47,7 +47,7 @@ def read(path: Path) -> FlightLog:
     return from_columns(name, KIND, columns, ends)
 
 
-_STATES = (("stateEstimate", 1.0), ("stateEstimateZ", 1e-3))
+_STATES = (("stateEstimate", 1.0), ("stateEstimateZ", 1e-3))  # the packed ones are in millimetres
 
 
 def from_columns(name: str, kind: str, columns: dict[str, tuple[Array, Array]], ends: str = "") -> FlightLog:
@@ -88,21 +88,12 @@ def from_columns(name: str, kind: str, columns: dict[str, tuple[Array, Array]], 
     upright = (axis[0], axis[1][:, 2]) if axis else (roll[0], np.prod(np.cos(roll[1]), axis=1)) if roll else None
     acc = [f"acc.{a}" for a in "xyz"]
     sources = {
-        "command": command,
-        "rpm": many(*(f"rpm.m{i}" for i in "1234")),
-        "acceleration": many(*acc, factor=G0),
-        "rates": many(*(f"gyro.{a}" for a in "xyz"), factor=np.pi / 180.0),
-        "upright": upright,
-        "axis": axis,
-        # the packed ones are in millimetres
-        **{
-            what: first(*(([f"{group}.{v}{a}" for a in "xyz"], factor) for group, factor in _STATES))
-            for what, v in (("velocity", "v"), ("position", ""))
-        },
-        "voltage": one("pm.vbatMV", 1e-3) or one("pm.vbat", 1.0),
-        "thrust": thrust,
-        "torque": demand,
-    }
+        "command": command, "rpm": many(*(f"rpm.m{i}" for i in "1234")), "acceleration": many(*acc, factor=G0),
+        "rates": many(*(f"gyro.{a}" for a in "xyz"), factor=np.pi / 180.0), "upright": upright, "axis": axis,
+        **{what: first(*(([f"{group}.{v}{a}" for a in "xyz"], factor) for group, factor in _STATES))
+           for what, v in (("velocity", "v"), ("position", ""))},
+        "voltage": one("pm.vbatMV", 1e-3) or one("pm.vbat", 1.0), "thrust": thrust, "torque": demand,
+    }  # fmt: skip
     main = "command" if command else "rpm"
     raw = many(*acc, factor=G0, whole=True)
     return joined(name, kind, sources, main, raw=raw, layout="crazyflie", ends=ends, mixed=said, duty=duty)

@@ -24,8 +24,9 @@ from bemt.base.errors import Fault, refuse
 from bemt.base.units import G0
 from bemt.judge.diagnose.rotor_calibration import learn
 from bemt.rotors.model import air_fields, air_of_points
+from bemt.tools.flight.layout import layout_of
 from bemt.tools.flight.log import FlightLog
-from bemt.tools.flight.repeat import BATCHES, flight_scatter, half_width, jackknifed
+from bemt.tools.flight.repeat import BATCHES, flight_scatter, half_width, jackknifed, regressed
 
 if TYPE_CHECKING:
     from bemt.rotors.as_measured import AsMeasured
@@ -63,27 +64,21 @@ def identify(log: FlightLog, mass_kg: float | None = None) -> Identified:
     out: dict[str, Constant] = {}
     rotors: dict[str, tuple[float, ...]] = {}
     unseen: list[str] = []
-    drive = log.rpm if log.rpm is not None else log.command
+    speeds = log.rpm is not None
+    drive = log.rpm**2 if log.rpm is not None else log.command
     if drive is None:
-        text = (
-            "motors: the log holds neither commands nor speeds (RCOU of ArduPilot, actuator_motors of PX4, motor, pwm)"
-        )
-        return Identified(out, rotors, (text,), None)
+        text = "the log holds neither commands nor speeds (RCOU of ArduPilot, actuator_motors of PX4, motor, pwm)"
+        return Identified(out, rotors, (f"motors: {text}",), None)
     if on.sum() < 50:
         return Identified(out, rotors, ("rotors: no flight with the motors running; fly 10 s or more",), None)
-    t, x = log.t[on], drive[on]
-    upright = np.ones(t.size) if log.upright is None else log.upright[on]
-    speeds = log.rpm is not None
-    power = x**2 if speeds else x
-    word, unit = (
-        ("thrust constant", "N/rpm^2")
-        if speeds
-        else ("thrust per command", "N" if log.command_unit == "1" else f"N/{log.command_unit}")
-    )
+    power = drive[on]
+    upright = 1.0 if log.upright is None else log.upright[on]
+    word, unit = "thrust per command", "N" if log.command_unit == "1" else f"N/{log.command_unit}"
     m, per = (1.0, "/kg") if mass_kg is None else (mass_kg, "")
     weight = _balance(log, on, power.sum(axis=1) * upright)
-    if weight is not None and speeds:
-        weight = _hovering(log, on, weight)
+    if speeds:
+        word, unit = "thrust constant", "N/rpm^2"
+        weight = None if weight is None else _hovering(log, on, weight)
     if weight is not None and speeds and log.sensors:
         # What the repair leaves open of the sum of squares.
         open_ = [2.0 * s.u * float(power[:, s.motor - 1].mean() / power.sum(axis=1).mean()) for s in log.sensors]
@@ -97,13 +92,13 @@ def identify(log: FlightLog, mass_kg: float | None = None) -> Identified:
         c = log.command[on]
         rotors["mean command"] = tuple(map(float, c.mean(axis=0)))
         out["hover command"] = _blocks(c.mean(axis=1), np.mean, log.command_unit)
-    if speeds:
-        rotors["mean rpm"] = tuple(map(float, x.mean(axis=0)))
-        rotors["share of rpm^2"] = tuple(map(float, (x**2).mean(axis=0) / np.mean(x**2)))
+    if log.rpm is not None:
+        rotors["mean rpm"] = tuple(map(float, log.rpm[on].mean(axis=0)))
+        rotors["share of rpm^2"] = tuple(map(float, power.mean(axis=0) / np.mean(power)))
         _per_rotor(log, on, m, per, out, unseen)
     else:
         unseen.append("thrust over speed: log the speed of each rotor (ESC telemetry)")
-    _yaw(log, on, power, speeds, out, unseen)
+    _yaw(log, on, drive, out, unseen)
     _motor(log, on, out, unseen)
     return Identified(out, rotors, tuple(unseen), weight)
 
@@ -149,14 +144,6 @@ def _blocks(y: Array, of: Callable[[Array], np.floating], unit: str) -> Constant
     return Constant(float(of(y)), half_width([of(b) for b in np.array_split(y, BATCHES)]), unit)
 
 
-def _regress(X: Array, y: Array) -> tuple[Array, Array]:
-    """Least squares, with half widths of 95 %."""
-    from scipy import stats
-
-    whole, u = jackknifed(X, y)
-    return whole, float(stats.t.ppf(0.975, BATCHES - 1)) * u
-
-
 def _per_rotor(
     log: FlightLog, on: NDArray[np.bool_], m: float, per: str, out: dict[str, Constant], unseen: list[str]
 ) -> None:
@@ -166,7 +153,7 @@ def _per_rotor(
         unseen.append("thrust constant of each rotor: a speed sensor is at fault")
         return
     if log.acceleration is not None:
-        k, half = _regress(log.rpm[on] ** 2, log.acceleration[on, 2])
+        k, half = regressed(log.rpm[on] ** 2, log.acceleration[on, 2])
         if np.all(k > 0.0) and np.all(half < _APART * k):
             for i in range(k.size):
                 out[f"thrust constant, rotor {i + 1}"] = Constant(m * k[i], m * half[i], "N/rpm^2" + per)
@@ -176,11 +163,9 @@ def _per_rotor(
 
 
 def _yaw(
-    log: FlightLog, on: NDArray[np.bool_], power: Array, speeds: bool, out: dict[str, Constant], unseen: list[str]
-) -> None:
+    log: FlightLog, on: NDArray[np.bool_], drive: Array, out: dict[str, Constant], unseen: list[str]
+) -> None:  # fmt: skip
     """Angular acceleration in yaw over the difference of the two directions of turning."""
-    from bemt.tools.flight.layout import layout_of
-
     known = layout_of(log.layout, log.rotors)
     if log.rates is None or known is None:
         unseen.append("torque constant: log the yaw rate, give --layout, and fly yaw doublets")
@@ -190,20 +175,14 @@ def _yaw(
     smooth = np.ones(width) / width
     rate = np.gradient(np.convolve(log.rates[:, 2], smooth, "same"), log.t)[on]
     # A rotor that turns to the left pushes the body to the right.
-    side = np.convolve(np.nan_to_num(_drive(log)) @ known[:, 1], smooth, "same")[on]
-    c, half = _regress(np.column_stack([-side, np.ones(side.size)]), rate)
-    unit = "(rad/s^2)/" + ("rpm^2" if speeds else log.command_unit)
+    side = np.convolve(np.nan_to_num(drive) @ known[:, 1], smooth, "same")[on]
+    c, half = regressed(np.column_stack([-side, np.ones(side.size)]), rate)
+    unit = "(rad/s^2)/" + ("rpm^2" if log.rpm is not None else log.command_unit)
     if half[0] < 0.5 * abs(c[0]) and c[0] > 0.0:
         out["torque constant over yaw inertia"] = Constant(float(c[0]), float(half[0]), unit)
         unseen.append("torque constant itself: it needs the moment of inertia about the yaw axis")
     else:
         unseen.append("torque constant: this flight hardly yaws; fly yaw doublets")
-
-
-def _drive(log: FlightLog) -> Array:
-    out = log.rpm**2 if log.rpm is not None else log.command
-    assert out is not None
-    return out
 
 
 def _motor(log: FlightLog, on: NDArray[np.bool_], out: dict[str, Constant], unseen: list[str]) -> None:
@@ -212,7 +191,7 @@ def _motor(log: FlightLog, on: NDArray[np.bool_], out: dict[str, Constant], unse
     if speeds and log.command is not None and measured and log.command_unit == "1":
         assert log.rpm is not None and log.voltage is not None
         volts = (log.command[on] * log.voltage[on, None])[:, log.sound].mean(axis=1)
-        k, half = _regress(np.column_stack([volts, np.ones(volts.size)]), log.rpm[on][:, log.sound].mean(axis=1))
+        k, half = regressed(np.column_stack([volts, np.ones(volts.size)]), log.rpm[on][:, log.sound].mean(axis=1))
         if half[0] < abs(k[0]):
             out["motor line, slope"] = Constant(float(k[0]), float(half[0]), "rpm/V")
             out["motor line, offset"] = Constant(float(k[1]), float(half[1]), "rpm")
@@ -224,7 +203,7 @@ def _motor(log: FlightLog, on: NDArray[np.bool_], out: dict[str, Constant], unse
         return
     out["battery voltage"] = _blocks(log.voltage[on], np.mean, "V")
     if log.battery_current is not None and np.std(log.battery_current[on]) > 0.0:
-        line, half = _regress(np.column_stack([log.battery_current[on], np.ones(on.sum())]), log.voltage[on])
+        line, half = regressed(np.column_stack([log.battery_current[on], np.ones(on.sum())]), log.voltage[on])
         if line[0] < 0.0 and half[0] < -line[0]:
             out["battery resistance"] = Constant(float(-line[0]), float(half[0]), "ohm")
             return

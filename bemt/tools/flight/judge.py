@@ -43,8 +43,6 @@ from bemt.tools.flight.balance import (
 )
 from bemt.tools.flight.change import FlightChange, FlightEvidence, FlightReadings
 
-__all__ = ["ELSEWHERE", "BesideBalance", "FlightVerdict", "judge", "posterior", "total_sd"]
-
 ELSEWHERE = (DAY, BUILD, WIDE)
 """Explanations that say nothing of a fault: the healthy flights are of another day, or the vehicle is of its own."""
 _USUAL = 50.0  # weight of wind where the log shows it beside 1 for every fault: it is there in most flights [1]

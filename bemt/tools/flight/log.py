@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 
-__all__ = ["DENSE", "MOST", "SPARSE", "FlightLog", "SpeedSensor", "Stretches", "joined", "thrust_axis"]
-
 Source = tuple[Array, Array]
 T = TypeVar("T", bound=Sized)
 

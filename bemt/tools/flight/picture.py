@@ -45,12 +45,8 @@ def _empty(ax: Any, text: str) -> None:
 def _flow(ax: Any, answer: FlightAnswer) -> None:
     flow, said = answer.inflow, answer.predicted
     if flow is None or (flow.axial is None and flow.inplane is None):
-        _empty(
-            ax,
-            "Thrust in moving air: this flight does not show it.\nFly climbs, descents and fast passes; log "
-            "speeds,\naccelerometer, velocity and attitude",
-        )
-        return
+        return _empty(ax, "Thrust in moving air: this flight does not show it.\nFly climbs, descents and fast passes; "
+                      "log speeds,\naccelerometer, velocity and attitude")  # fmt: skip
     parts = ((flow.axial, flow.bins[0], said.axial if said else None, BLUE, "along the axis"),
              (flow.inplane, flow.bins[1], said.inplane if said else None, GREEN, "in the plane"))  # fmt: skip
     for got, bins, model, colour, name in parts:
@@ -116,13 +112,8 @@ def _thrust(ax: Any, answer: FlightAnswer, mass_kg: float | None) -> None:
         ax.plot(grid, k * grid**2, color=ORANGE, label="model")
         ax.fill_between(grid, (k - 2 * u) * grid**2, (k + 2 * u) * grid**2, color=ORANGE, alpha=0.2, lw=0)
     ax.plot([x.mean()], [m * G0 / B], "D", color=GREEN, label="weight over rotors")
-    ax.set_xlabel(
-        "speed [rev/min]"
-        if speeds
-        else "command, share of full"
-        if log.command_unit == "1"
-        else f"command [{log.command_unit}]"
-    )
+    command = "command, share of full" if log.command_unit == "1" else f"command [{log.command_unit}]"
+    ax.set_xlabel("speed [rev/min]" if speeds else command)
     ax.set_ylabel(f"thrust per rotor [{unit}]")
     ax.legend(frameon=False)
 

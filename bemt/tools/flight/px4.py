@@ -13,9 +13,10 @@ import io
 import mmap
 import re
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,8 @@ KIND = "PX4 ULog"
 _TOPICS = ["actuator_motors", "actuator_outputs", "esc_status", "sensor_combined", "vehicle_attitude",
            "vehicle_local_position", "battery_status", "sensor_accel_fifo", "actuator_controls_0",
            "vehicle_torque_setpoint", "vehicle_thrust_setpoint", "vehicle_gps_position", "sensor_gps"]  # fmt: skip
-_LONG, _STRETCH = 1 << 26, 16_384  # size from which a log is reduced first [bytes]; samples of a stretch
+_STRETCH = 16_384  # samples
+_KINDS, _DATA, _SYNC = b"BFIMPQADLSOCR", ord("D"), bytes.fromhex("2f731320250cbb12")
 _AIRFRAMES = {5: "quad-plus", 6: "hexa-x", 7: "hexa-plus", 8: "octo-x", 9: "octo-plus", 12: "x8"}  # by thousands
 _X = float(np.sqrt(0.5))
 _AXIS = np.array([-1.0, 1.0, 1.0])  # the thrust is along -z of the body; NED to north-west-up
@@ -46,49 +48,64 @@ def read(path: Path) -> FlightLog:
     name = str(path)
     ulog = needs("pyulog", "flight").ULog
     try:
-        with path.open("rb") as file, contextlib.redirect_stdout(io.StringIO()), np.errstate(all="ignore"):
-            long = path.stat().st_size > _LONG
-            found = ulog(_reduced(file) if long else file, _TOPICS, disable_str_exceptions=True)
+        with (path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data,
+              contextlib.redirect_stdout(io.StringIO()), np.errstate(all="ignore")):  # fmt: skip
+            head, topics, damaged = _gathered(data)
+            # pyulog knows the formats; of all messages it would take 4 us each.
+            found = ulog(io.BytesIO(head), _TOPICS, disable_str_exceptions=True)
+        return _made(name, found, topics, damaged or found.file_corruption)
+    except InputError:
+        raise
     except Exception as error:  # a parser meets any damage: struct, key, value, index, memory, its own
         got = f"a damaged log ({type(error).__name__}: {error})"
         raise InputError(Fault(name, "", got, "whole ULog messages", "Download the log again")) from error
-    try:
-        return _made(name, found)
-    except (TypeError, ValueError, KeyError, IndexError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(Fault(name, "", f"a damaged log ({error})", "whole ULog messages")) from error
 
 
-def _reduced(file: BinaryIO) -> io.BytesIO:
-    """A log with the messages of the used topics alone, fast topics in stretches (ULog file format, PX4 user guide)."""
-    with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-        head, topics, at, end = bytearray(data[:16]), dict[int, _Messages](), 16, len(data)
-        start = struct.Struct("<HcH").unpack_from  # size, kind and, of data, the number of the topic
-        while at + 5 <= end:
+def _gathered(data: mmap.mmap) -> tuple[bytearray, dict[int, _Messages], bool]:
+    """What tells the formats, with one message of each used topic; those topics by number; whether there is damage.
+
+    ULog file format, PX4 user guide. Behind damage the log goes on from the next mark, or byte.
+    """
+    head, topics, at, damaged = bytearray(data[:16]), dict[int, _Messages](), 16, False
+    start = struct.Struct("<HBH").unpack_from  # size, kind and, of data, the number of the topic
+    stops, marked = [len(data)], True  # data may be appended behind what was cut
+    while stops:
+        stop = stops.pop(0)
+        while at + 5 <= stop:
             size, kind, number = start(data, at)
             after = at + 3 + size
-            if after > end or kind not in b"BFIMPQADLSOCR":
-                break
-            if kind == b"D":
-                if number in topics and size > 2:
-                    topics[number].add(data[at:after])
-            elif kind == b"A":
+            if kind not in _KINDS or after > stop:
+                mark = data.find(_SYNC, at + 1, stop) if marked else -1
+                marked, cut = mark >= 0, kind in _KINDS
+                damaged, at = damaged or not cut, mark + len(_SYNC) if marked else stop if cut else at + 1
+                continue
+            if kind == _DATA:
+                topic = topics.get(number)
+                if topic is not None:
+                    if size == topic.size:
+                        topic.begun += data[at + 5 : after]
+                        if len(topic.begun) >= topic.full:
+                            topic.keep()
+                    elif topic.size or size < 3:
+                        damaged = True
+                    else:
+                        topic.begin(data[at + 5 : after])
+                        head += data[at:after]
+            elif kind == ord("A"):
                 name = data[at + 6 : after].decode("latin-1")
                 if name in _TOPICS:
                     number = struct.unpack_from("<H", data, at + 4)[0]
                     topics[number] = _Messages(32 if name == "sensor_accel_fifo" else 1)
                     head += data[at:after]
-            elif kind == b"B":
-                # without the places of appended data, which are other ones now
-                head += data[at : at + 3] + bytes(size)
+            elif kind == ord("B"):
+                head += data[at : at + 3] + bytes(size)  # without the places of appended data
+                places = struct.unpack_from("<3Q", data, at + 19) if size >= 40 else ()
+                stops[:0] = sorted(p for p in places if after < p < stop)
             elif kind in b"FPQ":
                 head += data[at:after]
             at = after
-    parts: list[bytes | bytearray | memoryview] = [head]
-    for messages in topics.values():
-        parts += [*(part.data for part in messages.kept.parts), messages.begun]
-    return io.BytesIO(b"".join(parts))
+        at = stop
+    return head, topics, damaged
 
 
 class _Messages:
@@ -98,26 +115,34 @@ class _Messages:
         # Single bursts are too short for a spectrum; of the others every 20th message stays.
         step = SPARSE if each == 1 else _STRETCH // each
         self.kept = Stretches[NDArray[Any]](lambda part: part[::step].copy(), each)
-        self.begun, self.size, self._full = bytearray(), 0, _STRETCH // each
+        self.begun, self.size, self.full, self._each = bytearray(), 0, 0, each
 
-    def add(self, message: bytes) -> None:
-        """Keep a message; all of a topic have one length, else it is damaged."""
-        if len(message) != self.size:
-            if self.size:
-                return
-            self.size = len(message)
-        self.begun += message
-        if len(self.begun) >= self._full * self.size:
-            self.kept.add(np.frombuffer(bytes(self.begun), dtype=f"V{self.size}"))
-            self.begun.clear()
+    def begin(self, first: bytes) -> None:
+        """Take the first message: all of a topic have one length, else they are damaged."""
+        self.begun += first
+        self.size, self.full = len(first) + 2, _STRETCH // self._each * len(first)
+
+    def keep(self) -> None:
+        """Keep a stretch."""
+        self.kept.add(np.frombuffer(bytes(self.begun), dtype=f"V{self.size - 2}"))
+        self.begun.clear()
+
+    def columns(self, first: Mapping[str, Array]) -> dict[str, Array]:
+        """All messages, in the formats of the columns of the first."""
+        self.keep()
+        formats = [(key, v.dtype) for key, v in first.items()]
+        rest = self.size - 2 - np.dtype(formats).itemsize
+        rows = np.concatenate(self.kept.parts).view([*formats, ("rest of a message", f"V{rest}")])
+        self.kept.parts.clear()
+        return {key: rows[key] for key in first}
 
 
-def _made(name: str, found: Any) -> FlightLog:
+def _made(name: str, found: Any, topics: Mapping[int, _Messages], damaged: bool) -> FlightLog:
     tables: dict[str, dict[str, Array]] = {}
     for d in found.data_list:
-        known = tables.get(d.name)
-        if known is None or _moves(d.data) > _moves(known):
-            tables[d.name] = d.data
+        data, known = topics[d.msg_id].columns(d.data), tables.get(d.name)
+        if known is None or _moves(data) > _moves(known):
+            tables[d.name] = data
 
     def take(topic: str, keys: list[str]) -> Source | None:
         data = tables.get(topic, {})
@@ -149,14 +174,13 @@ def _made(name: str, found: Any) -> FlightLog:
         "voltage": column(take("battery_status", ["voltage_v"]), 0),
         "battery_current": column(take("battery_status", ["current_a"]), 0), "thrust": thrust, "torque": torque,
     }  # fmt: skip
-    last = max((float(d["timestamp"][-1]) for d in tables.values() if len(d.get("timestamp", ()))), default=0.0)
-    ends = f"damaged; the last readable sample is at {last * 1e-6:.1f} s" if found.file_corruption else ""
     main = next((k for k in ("command", "rpm", "acceleration") if sources[k]), "thrust")
     kept = {k: params[k] for k in ("THR_MDL_FAC", "MPC_THR_HOVER") if np.isfinite(params.get(k, np.nan))}
     kept |= {"demanded": 1.0} if command.demanded else {}
-    return joined(name, KIND, sources, main, raw=_bursts(tables.get("sensor_accel_fifo", {})) or acceleration,
-                  command_unit=command.unit, layout=_layout(params, B), ends=ends, mixed=command.mixed,
-                  date=_date(take), parameters=kept, stated_rotors=_stated(params))  # fmt: skip
+    log = joined(name, KIND, sources, main, raw=_bursts(tables.get("sensor_accel_fifo", {})) or acceleration,
+                 command_unit=command.unit, layout=_layout(params, B), mixed=command.mixed, date=_date(take),
+                 parameters=kept, stated_rotors=_stated(params))  # fmt: skip
+    return replace(log, ends=f"damaged; readable up to {log.t[-1]:.1f} s") if damaged else log
 
 
 class _Command(NamedTuple):

@@ -97,6 +97,23 @@ def jackknifed(X: Array, y: Array) -> tuple[Array, Array]:
     return fitted(every), np.asarray(np.sqrt((BATCHES - 1) * np.mean(spread**2, axis=0)))
 
 
+def regressed(X: Array, y: Array) -> tuple[Array, Array]:
+    """The same with half widths of 95 %."""
+    from scipy import stats
+
+    whole, u = jackknifed(X, y)
+    return whole, float(stats.t.ppf(0.975, BATCHES - 1)) * u
+
+
+def block_means(t: Array, width: float, *series: Array) -> tuple[NDArray[np.intp], list[Array]]:
+    """Numbers of the blocks of a series in order of time that are at least half full; means in them of (N, k) each."""
+    number = np.floor((t - t[0]) / width).astype(int)
+    count = np.bincount(number)
+    full = np.flatnonzero(count >= max(0.5 * np.median(count[count > 0]), 2))
+    sums = [[np.bincount(number, weights=c)[full] for c in v.T] for v in series]
+    return full, [(np.reshape(s, (-1, full.size)) / count[full]).T.copy() for s in sums]
+
+
 # Which healthy flights belong to one session, and whether the judged flight does: as stated, or by date.
 #
 # A battery taken out and put back, or a propeller exchanged, moves the trim; within a session it stays.

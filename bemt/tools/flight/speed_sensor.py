@@ -29,8 +29,6 @@ from bemt.tools.flight.balance import ALARM, TRIM, TRIM_FREE, axes_of
 from bemt.tools.flight.layout import layout_of
 from bemt.tools.flight.log import FlightLog, SpeedSensor
 
-__all__ = ["checked"]
-
 _COUNTS = tuple(Fraction(k, m) for k, m in ((1, 2), (1, 3), (2, 3), (1, 4), (3, 2), (2, 1), (3, 1)))
 """Blades seen over blades that pass: of two, three and four, and doubled edges."""
 _SURE = 0.95  # probability from which a sensor is at fault [1]

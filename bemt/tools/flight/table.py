@@ -63,7 +63,7 @@ def read(path: Path) -> FlightLog:
     """Read a table, in pieces; its headings decide what it is."""
     import pandas as pd
 
-    name, ends = str(path), ""
+    name = str(path)
     with path.open("rb") as file:
         head = file.read(_HEAD_BYTES)
     lines = head.decode("utf-8", errors="replace").split("\n")
@@ -80,17 +80,17 @@ def read(path: Path) -> FlightLog:
     except (ValueError, pd.errors.ParserError) as error:
         raise InputError(Fault(name, "", f"a damaged table ({error})", "rows of equal length")) from error
     if {"pwm", "v", "R", "t"} <= set(frame.columns):
-        return _cells(name, frame, ends)
+        return _cells(name, frame)
     clock = next((c for c in ("t_s", "timestamp") if c in frame), "")
     if clock and any(c.startswith(("motor.m", "pwm.m", "rpm.m", "controller.cmd")) for c in frame.columns):
         numbers = frame.apply(pd.to_numeric, errors="coerce").dropna()
         t = numbers[clock].to_numpy(float) * (1.0 if clock == "t_s" else 1e-3)  # CrazyPAD's stamps are in ms
         columns = {c: (t, numbers[c].to_numpy(float)) for c in numbers.columns if c != clock}
-        return crazyflie.from_columns(name, "Crazyflie CSV", columns, ends)
+        return crazyflie.from_columns(name, "Crazyflie CSV", columns)
     if any(c.startswith(("motor[", "eRPM[")) for c in frame.columns):
-        return _betaflight(name, frame, said, ends)
+        return _betaflight(name, frame, said)
     if any(_rotor(c) is not None for c in frame.columns):
-        return _speeds(name, frame, ends)
+        return _speeds(name, frame)
     raise InputError(Fault(name, "", f"no speed of a motor beside {', '.join(map(str, frame.columns[:8]))}", _READ))
 
 
@@ -122,7 +122,7 @@ def _frame(rows: BinaryIO) -> pd.DataFrame:
     return pd.concat(kept.parts, ignore_index=True)
 
 
-def _cells(name: str, frame: pd.DataFrame, ends: str) -> FlightLog:
+def _cells(name: str, frame: pd.DataFrame) -> FlightLog:
     """Arrays as JSON in the cells; rows that cannot be read are dropped."""
     keys = [k for k in ("p", "v", "R", "w", "fa", "pwm") if k in frame]
     rows, times = [], []
@@ -139,8 +139,7 @@ def _cells(name: str, frame: pd.DataFrame, ends: str) -> FlightLog:
             continue
     if not rows:
         raise InputError(Fault(name, "", "no row that can be read", "arrays in the cells"))
-    if len(rows) < len(frame):
-        ends = ends or f"{len(frame) - len(rows)} damaged rows are left out"
+    ends = f"{len(frame) - len(rows)} damaged rows are left out" if len(rows) < len(frame) else ""
     time = np.array(times)
     got = {k: (time, np.array([r[i] for r in rows])) for i, k in enumerate(keys)}
     wide = {"p": (3,), "v": (3,), "R": (3, 3), "w": (3,), "fa": (3,)}
@@ -154,7 +153,7 @@ def _cells(name: str, frame: pd.DataFrame, ends: str) -> FlightLog:
     return joined(name, "CSV of arrays", sources, "command", command_unit="pwm", ends=ends)
 
 
-def _speeds(name: str, frame: pd.DataFrame, ends: str) -> FlightLog:
+def _speeds(name: str, frame: pd.DataFrame) -> FlightLog:
     """A table of time and speeds alone: hovering gives the thrust constant."""
     clock, unit = next(((c, m[2]) for c in frame.columns if (m := _TIME.fullmatch(c))), ("", None))
     if not clock:
@@ -169,10 +168,10 @@ def _speeds(name: str, frame: pd.DataFrame, ends: str) -> FlightLog:
         expected = "2 to 20,000 rows a second"
         raise InputError(Fault(name, clock, f"rows {step:.3g} {unit or ''} apart", expected, "Is the unit right?"))
     rpm = frame[sorted(number, key=lambda c: number[c])].to_numpy(float)
-    return joined(name, "CSV of speeds", {"rpm": (scale * t, rpm)}, "rpm", ends=ends)
+    return joined(name, "CSV of speeds", {"rpm": (scale * t, rpm)}, "rpm")
 
 
-def _betaflight(name: str, numbers: pd.DataFrame, said: dict[str, str], ends: str) -> FlightLog:
+def _betaflight(name: str, numbers: pd.DataFrame, said: dict[str, str]) -> FlightLog:
     clock = next((c for c in numbers.columns if _TIME.fullmatch(c)), "")
     if not clock.startswith("time"):
         raise InputError(Fault(name, "time", "no such column", "time in us", "Decode with blackbox_decode"))
@@ -189,22 +188,19 @@ def _betaflight(name: str, numbers: pd.DataFrame, said: dict[str, str], ends: st
         low, high = _range(command[1], said.get("motorOutput", ""))
         command = (t, np.clip((command[1] - low) / (high - low), 0.0, None))
     gyro, unfiltered = many("gyroADC", np.pi / 180.0), many("gyroUnfilt", np.pi / 180.0)
-    acceleration = many("accSmooth", G0 / per_g) if per_g > 0.0 else None
     sources = {
-        "command": command,
-        "rpm": many("eRPM", 200.0 / poles) if poles > 0.0 else None,
-        "acceleration": acceleration,
-        "rates": gyro,
+        "command": command, "rpm": many("eRPM", 200.0 / poles) if poles > 0.0 else None, "rates": gyro,
+        "acceleration": many("accSmooth", G0 / per_g) if per_g > 0.0 else None,
         "voltage": (t, numbers[volt].to_numpy(float)) if volt else None,
         "battery_current": (t, numbers[amp].to_numpy(float)) if amp else None,
-    }
+    }  # fmt: skip
     B = command[1].shape[1] if command else 0
     turned = "-rev" if _number(said.get("yaw_motors_reversed")) else ""
     layout = f"betaflight-x{turned}" if B == 4 else ""
     raw = unfiltered or gyro
     raw = raw if raw is not None and raw[1].shape[1] == 3 else None
     main = "command" if command else "rpm"
-    return joined(name, "Betaflight CSV", sources, main, raw=raw, raw_unit="rad/s", layout=layout, ends=ends)
+    return joined(name, "Betaflight CSV", sources, main, raw=raw, raw_unit="rad/s", layout=layout)
 
 
 def _number(text: str | None) -> float:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from bemt.base.tables import number_text
 from bemt.judge.loss import Decision
 from bemt.tools.flight.answer import FlightAnswer
 from bemt.tools.flight.balance import BLADE, WEIGHT, WIDE
@@ -56,7 +57,7 @@ def _details(a: FlightAnswer) -> list[str]:
     """Constants, and what is missing."""
     lines = ["", "Identified (± 95 %)"] if a.found.constants else []
     lines += [f"  {name:<34} {_number(c)}" for name, c in a.found.constants.items()]
-    lines += [f"  {name:<34} {', '.join(_figures(v, 4) for v in values)}" for name, values in a.found.rotors.items()]
+    lines += [f"  {name:<34} {', '.join(number_text(v, 4) for v in values)}" for name, values in a.found.rotors.items()]
     if a.mass is not None:
         lines.append(f"  {'mass, from the healthy flights':<34} {_number(a.mass)}")
     if a.predicted is not None:
@@ -155,7 +156,7 @@ def _together(a: FlightAnswer) -> str:
     how = "harder" if j.total > 0.0 else "less"
     why = "weight at the centre, battery, air, or damage that balances"
     if m is not None:
-        why = f"with their propellers it weighs {_figures(1e3 * m.value, 3)} ± {_figures(1e3 * m.half, 2)} g"
+        why = f"with their propellers it weighs {number_text(1e3 * m.value, 3)} ± {number_text(1e3 * m.half, 2)} g"
     return f"All motors are driven {100 * abs(j.total):.0f} % {how} than in the healthy flights (they differ by " \
            f"±{100 * j.total_half:.0f} %), and share the work as there: {why}."  # fmt: skip
 
@@ -289,19 +290,10 @@ def _flow(a: FlightAnswer) -> list[str]:
     flow, said, lines = a.inflow, a.predicted, []
     if flow is None:
         return []
+    along, across = (None, None) if said is None else (said.axial, said.inplane)
     for name, got, at, model in (
-        (
-            "thrust at {:+.1f} m/s along the axis",
-            flow.axial,
-            flow.axial_m_s[1],
-            None if said is None else said.axial,
-        ),
-        (
-            "thrust at {:.1f} m/s in the plane",
-            flow.inplane,
-            flow.inplane_m_s,
-            None if said is None else said.inplane,
-        ),
+        ("thrust at {:+.1f} m/s along the axis", flow.axial, flow.axial_m_s[1], along),
+        ("thrust at {:.1f} m/s in the plane", flow.inplane, flow.inplane_m_s, across),
     ):
         if got is not None:
             more = "" if model is None else f"; model {100 * np.interp(at, *model):+.1f} %"
@@ -331,14 +323,7 @@ def _signed(part: float) -> str:
 
 
 def _number(c: Constant) -> str:
-    return f"{_figures(c.value, 4)} ± {_figures(c.half, 2)} {'' if c.unit == '1' else c.unit}".rstrip()
-
-
-def _figures(value: float, count: int) -> str:
-    """A number with so many significant figures, without an exponent where it is short enough."""
-    rounded = float(f"{value:.{count}g}")
-    plain = 1e-3 <= abs(rounded) < 1e6
-    return np.format_float_positional(rounded, trim="-") if plain else f"{value:.{count}g}"
+    return f"{number_text(c.value, 4)} ± {number_text(c.half, 2)} {'' if c.unit == '1' else c.unit}".rstrip()
 
 
 def headline(j: FlightVerdict) -> str:

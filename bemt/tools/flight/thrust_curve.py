@@ -11,7 +11,7 @@ and 0.96 and between 0.33 and 0.93, so flights differ by 0.14 (pooled), which no
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +20,7 @@ from bemt.base.arrays import Array
 from bemt.base.units import G0
 from bemt.tools.flight.identify import Constant, Identified
 from bemt.tools.flight.log import FlightLog
-from bemt.tools.flight.repeat import BATCHES, flight_scatter, half_width, jackknifed
-
-__all__ = ["thrust_curve"]
+from bemt.tools.flight.repeat import BATCHES, block_means, flight_scatter, half_width, jackknifed, regressed
 
 _BLOCK_S, _WIDE, _SCATTER = 0.25, 0.5, 0.14
 """Length of a mean [s]; half width of e from which it is not given; standard deviation of e between flights [1]."""
@@ -82,34 +80,26 @@ def _share(log: FlightLog) -> Array | None:
 
 def _slope(log: FlightLog, t: Array, x: Array) -> tuple[float, float] | None:
     """Logarithmic slope of thrust over command, and its standard uncertainty."""
-    number = np.floor((t - t[0]) / _BLOCK_S).astype(int)
-    count = np.bincount(number)
-    full = count >= 0.5 * np.median(count[count > 0])
-
-    def means(v: Array) -> Array:
-        return np.stack([np.bincount(number, weights=c)[full] / count[full] for c in v.T], axis=1)
-
     on = log.flying
     if log.rpm is not None and log.sound and log.rpm.shape == log.command.shape:  # type: ignore[union-attr]
-        y, z = means(log.rpm[on][:, log.sound] ** 2), means(x[:, log.sound])
+        lift, x = log.rpm[on][:, log.sound] ** 2, x[:, log.sound]
     elif log.acceleration is not None:
-        y, z = means(log.acceleration[on, 2:3] / G0), means(x.mean(axis=1, keepdims=True))
+        lift, x = log.acceleration[on, 2:3] / G0, x.mean(axis=1, keepdims=True)
     else:
         return None
+    volts = np.ones((t.size, 1)) if log.voltage is None else log.voltage[on][:, None]
+    full, (y, z, u) = block_means(t, _BLOCK_S, lift, x, volts)
     if len(y) < 2 * BATCHES or not (np.all(y > 0.0) and np.all(z > 0.0)):
         return None
-    late = np.flatnonzero(full) / full.size - 0.5
-    if log.voltage is not None and np.ptp(log.voltage[on]) > 0.0:
-        late = np.log(np.maximum(means(log.voltage[on][:, None])[:, 0], 0.1))
-        late = late - late.mean()
+    late = np.log(np.maximum(u[:, 0], 0.1)) if np.ptp(volts) > 0.0 else full / (full[-1] + 1) - 0.5
     # A level for each rotor; rows in order of time, so that a tenth of them is a tenth of the flight.
     y, z = np.log(y), np.log(z)
     Y, Z = y - y.mean(axis=0), z - z.mean(axis=0)
     X = np.stack([Z.reshape(-1), np.repeat(late - late.mean(), Z.shape[1])], axis=1)
     if np.ptp(X[:, 1]) == 0.0:
         X = X[:, :1]
-    found, u = jackknifed(X, Y.reshape(-1))
-    return float(found[0]), float(u[0])
+    found, sd = jackknifed(X, Y.reshape(-1))
+    return float(found[0]), float(sd[0])
 
 
 # How thrust moves with the air that meets the rotor: along its axis (climb, descent) and in its plane (advance).
@@ -139,8 +129,6 @@ class Inflow:
 
 def inflow(log: FlightLog) -> Inflow | None:
     """Regress the thrust constant on the flow; None where a channel is missing or the flight is short."""
-    from scipy import stats
-
     on = log.flying
     if log.rpm is None or log.acceleration is None or log.velocity is None or log.axis is None or on.sum() < 200:
         return None
@@ -159,8 +147,7 @@ def inflow(log: FlightLog) -> Inflow | None:
     X = X * moves
     size = np.maximum(np.abs(X).max(axis=0), 1e-12)
     X = X / size
-    whole, sd = jackknifed(X, y)
-    half = float(stats.t.ppf(0.975, BATCHES - 1)) * sd
+    whole, half = regressed(X, y)
     rest = y - X @ whole
     return Inflow(
         (float(whole[0]), float(half[0])) if moves[0] else None,
@@ -194,16 +181,11 @@ def simulator_constants(log: FlightLog, found: Identified) -> dict[str, Constant
     differ by; the others are of this flight.
     """
     out: dict[str, Constant] = {}
-    k = found.constants.get("thrust constant")
-    if k is not None:
-        sd, factor = flight_scatter([])
-        scale = _RAD_S**-2
-        half = float(np.hypot(k.half, factor * sd * k.value))
-        out["thrust constant"] = Constant(scale * k.value, scale * half, k.unit.replace("rpm^2", "(rad/s)^2"))
-    command = found.constants.get("thrust per command")
-    if command is not None:
-        sd, factor = flight_scatter([])
-        out["thrust per command"] = replace(command, half=float(np.hypot(command.half, factor * sd * command.value)))
+    sd, factor = flight_scatter([])
+    for name, scale in (("thrust constant", _RAD_S**-2), ("thrust per command", 1.0)):
+        if (k := found.constants.get(name)) is not None:
+            half = float(np.hypot(k.half, factor * sd * k.value))
+            out[name] = Constant(scale * k.value, scale * half, k.unit.replace("rpm^2", "(rad/s)^2"))
     if log.rpm is not None and "mean rpm" in found.rotors:
         speed = np.sqrt(np.mean(log.rpm[log.flying] ** 2, axis=1))
         blocks = np.array([b.mean() for b in np.array_split(speed, BATCHES)])
@@ -273,6 +255,6 @@ def _misfit(t: Array, drive: Array | None, rpm: Array, tau: float, step: float, 
         lagged, _ = lfilter([1.0 - keep], [1.0, -keep], drive, zi=[keep * drive[0]])
         columns.append(lagged[part])
     X = np.column_stack(columns)
-    scale = np.maximum(np.abs(X).max(axis=0), 1e-12)
-    fit = (X / scale) @ np.linalg.lstsq(X / scale, rpm[part], rcond=None)[0]
-    return float(np.sum((rpm[part] - fit) ** 2))
+    X /= np.maximum(np.abs(X).max(axis=0), 1e-12)
+    found = np.linalg.lstsq(X.T @ X, X.T @ rpm[part], rcond=None)[0]  # the long matrix takes seconds
+    return float(np.sum((rpm[part] - X @ found) ** 2))

@@ -34,8 +34,8 @@ _FLOOR = {"m/s2": 0.2, "rad/s": 0.02}
 class Vibration:
     """What the accelerometer shows of the rotors."""
 
-    rate_hz: float  # Samples a second; NaN without an accelerometer or gyro [Hz]
-    shaft_hz: float  # Mean speed of the rotors; NaN without speeds [Hz]
+    rate_hz: float = float("nan")  # Samples a second; NaN without an accelerometer or gyro [Hz]
+    shaft_hz: float = float("nan")  # Mean speed of the rotors; NaN without speeds [Hz]
     # Of each rotor at once and at twice a turn; NaN where it is above the Nyquist frequency or not told apart [`unit`]
     amplitude: tuple[float, ...] = ()
     blade: tuple[float, ...] = ()
@@ -69,7 +69,7 @@ def _found(log: FlightLog) -> Vibration:
     if not shaft > 1.0:
         speeds, shaft = None, float("nan")
     if log.raw is None or log.raw[0].size < 2:
-        return Vibration(float("nan"), shaft, missing="no accelerometer in the log")
+        return Vibration(shaft_hz=shaft, missing="no accelerometer in the log")
     t, v = log.raw
     step = float(np.median(np.diff(t)))
     rate = 1.0 / step
@@ -161,22 +161,18 @@ def _tracked(v: Array, angle: Array, windows: list[slice], smooth: int) -> Array
 
 def _windows(log: FlightLog, t: Array, step: float, length: float) -> list[slice]:
     """Gapless windows in the air; shorter ones where the sensor was sampled in bursts."""
-    breaks = np.flatnonzero(np.diff(t) > 1.5 * step) + 1
-    runs = [r for r in np.split(np.arange(t.size), breaks) if r.size >= 128]
-    if not runs:
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(t) > 1.5 * step) + 1, [t.size]])
+    long = np.diff(edges) >= 128
+    if not long.any():
         return []
-    size = min(int(length / step), int(np.median([r.size for r in runs])))
+    size = min(int(length / step), int(np.median(np.diff(edges)[long])))
     if size < 16:
         return []
     flying = log.flying if log.drive is not None or log.thrust is not None else np.ones(log.t.size, dtype=bool)
     air = np.interp(t, log.t, flying.astype(float)) > 0.5
-    out = []
-    for run in runs:
-        for begin in range(run[0], run[-1] + 2 - size, size):
-            part = slice(begin, begin + size)
-            if air[part].all():
-                out.append(part)
-    return out[: max(int(_MOST_S / (size * step)), 1)]
+    parts = [slice(k, k + size) for a, b in zip(edges[:-1][long], edges[1:][long], strict=True)
+             for k in range(a, b + 1 - size, size)]  # fmt: skip
+    return [p for p in parts if air[p].all()][: max(int(_MOST_S / (size * step)), 1)]
 
 
 def _line(power: Array, low: int, high: int) -> float:
