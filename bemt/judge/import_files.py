@@ -73,7 +73,7 @@ def import_(
         What coefficients rest on: area=A length=L speed=V density=RHO sound=A. [m2, m, m/s, kg/m3, m/s]
     setup : mapping
         How it was computed: cells=2.1e6 grid_level=fine turbulence='k-omega SST' solver=pressure steady=no gci_pct=2;
-        cells=0.5e6,1.7e6,5.8e6 makes a grid study of three files.
+        cells=0.5e6,1.7e6,5.8e6 makes a grid study of three folders, or of three files of each kind.
     out : path, optional
         File that keeps what you state: run.toml, study.toml of several grids or recording.toml; every command takes it
         in place of the files.

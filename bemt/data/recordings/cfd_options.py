@@ -24,9 +24,11 @@ from bemt.data.readers.headings import counts_electrical, heading, meanings
 from bemt.data.readers.recording_toml import QUANTITIES as CHANNELS
 from bemt.data.readers.recording_toml import RecordingToml
 from bemt.data.readers.split import decimal_mark, some, split_table
-from bemt.data.readers.unit_text import TWO_MEANINGS, unit_for
+from bemt.data.readers.unit_text import BY_THE_CASE, TWO_MEANINGS, unit_for
+from bemt.data.recordings.cfd_files import home_of
 from bemt.data.recordings.cfd_loads import DUCT
 from bemt.data.recordings.channels import named
+from bemt.physics.dataset import Dataset
 
 Facts = dict[str, str | int]
 """What options say of one quantity: ``column``, ``unit``, ``sign``."""
@@ -157,19 +159,38 @@ def run_from(
 
 
 def _grids(files: Sequence[str], told: Told, faults: list[Fault]) -> list[Mapping[str, object]]:
-    """Grids of a study, one file each: every run.toml of several, or files whose cells are listed; [] for one run."""
+    """Grids of a study: every run.toml of several, or files whose cells are listed; [] for one run.
+
+    A number for each file, or one for each grid of which there is one file of each kind, by its columns, in this order.
+    """
     cells = told.get("cells")
     if isinstance(cells, str) and "," in cells:
-        each = [number(part) for part in cells.split(",")]
+        each, own = [number(part) for part in cells.split(",")], [_home(f) for f in files]
+        at = [own[:k].count(home) for k, home in enumerate(own)]  # of files of one kind
+        if len(each) != len(files) and {own.count(home) for home in own} == {len(each)}:
+            each = [each[k] for k in at]
         if len(each) == len(files) and None not in each:
-            return [{"files": (f,), "cells": n} for f, n in zip(files, each, strict=True)]
-        got = f"cells={cells} for {len(files)} files"
-        faults.append(Fault("", "--setup", got, "one number for each file, in their order", "A folder counts as one"))
+            grids = {n: [k for k, m in enumerate(each) if m == n] for n in each}
+            if any(len({own[k] for k in of}) < len(of) for of in grids.values()):  # of several conditions
+                return [{"files": (f,), "cells": n} for f, n in zip(files, each, strict=True)]
+            return [{"files": tuple(files[k] for k in of), "cells": n} for n, of in grids.items()]
+        got, wanted = f"cells={cells} for {len(files)} files", "one number for each file, in their order"
+        hint = f"Or {len(each)} files of each kind; a folder counts as one"
+        faults.append(Fault("", "--setup", got, wanted, hint))
         told["cells"] = None
         return []
     made = [(Path(f) / "run.toml").as_posix() if (Path(f) / "run.toml").is_file() else f for f in files]
     told.setdefault("cells", None)
     return [{"files": (f,)} for f in made] if len(made) > 1 and all(_is_run(Path(f)) for f in made) else []
+
+
+def _home(file: str) -> object:
+    """What files of one kind have in common: format and columns; any other file is of its own kind."""
+    with suppress(InputError, OSError):
+        record = readers.read(file)
+        if isinstance(record, Dataset):
+            return home_of(file, record)
+    return file
 
 
 def _option(where: str) -> str:
@@ -271,6 +292,8 @@ class _Measured:
         if name not in CHANNELS and name not in self.known:
             meant = did_you_mean(name, [*CHANNELS, *self.known]).strip()
             return Fault("", "--unit", name, f"one of {some(map(repr, self.known), 12)}, or a quantity", meant)
+        if name in self.known and (unit := heading(name).unit) and unit.dimension == "none":
+            return Fault("", "--unit", f"{name}={text}", "no unit", f"Leave it out: {BY_THE_CASE}")
         quantity = name if name in CHANNELS else self.taken.get(name) or self._by_unit(name, text)
         told = None if quantity is None else _unit(quantity, text)
         if quantity is None or told is None:

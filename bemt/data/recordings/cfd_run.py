@@ -21,10 +21,11 @@ from bemt.base.tables import number_of, number_text, text_table
 from bemt.data import readers
 from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import RunToml
-from bemt.data.readers.headings import channel_of, meanings
+from bemt.data.readers.headings import channel_of, heading, meanings
 from bemt.data.recordings.cfd_files import EXPORT, PROGRAMS, Settled, cfd_files, clock_of, read_run, settled, zone_of
 from bemt.data.recordings.cfd_loads import (
     CHANNEL,
+    COEFFICIENTS,
     NET,
     LoadColumn,
     OpenRun,
@@ -48,10 +49,9 @@ MOVING = 0.01
 """Drift over the averaged part above which a load has not settled. [1]"""
 LOST = 0.5
 """Drift above which there is no mean worth a point. [1]"""
-_COEFFICIENTS = ("CT", "CQ", "CP", "J")
 _GRIDS = frozenset(("cells", "cell_size"))
 _POINT = ("rpm", "airspeed_m_s", "density_kg_m3", "J")
-_KNOWN = frozenset((*_COEFFICIENTS, "KT", "KQ", "10KQ", "eta", "eta0", "FM", "time_s"))
+_KNOWN = frozenset((*COEFFICIENTS, "eta", "eta0", "FM", "time_s"))
 """Names of columns that say the loads once more."""
 _NAMED_LOAD = re.compile(r"force|thrust|torque|moment|lift|drag", re.IGNORECASE)
 _BESIDE = {"force.dat": "moment.dat", "moment.dat": "force.dat"}  # files that OpenFOAM writes beside each other
@@ -220,7 +220,7 @@ def _nothing(work: OpenRun) -> None:
     known = ", ".join(list(dict.fromkeys(c.name for c in work.columns))[:8]) or "none but the clock"
     if what := other_than_loads(c.name for c in work.columns):
         return work.fault(None, "", f"{what} ({known})", NO_LOAD, EXPORT)
-    first = next((c.name for c in work.columns if not c.unit), "NAME")
+    first = next((c.name for c in work.columns if not c.unit and not heading(c.words).unit), "NAME")
     hint = f'Say which it is by its unit: --unit "{first}=N" for a thrust, "{first}=N m" for a torque'
     work.fault(None, "", f"columns {known}", NO_LOAD, hint)
 
@@ -247,7 +247,7 @@ class _Points:
 
 def _operating(work: OpenRun, rpm: Array) -> dict[str, Array]:
     """Operating point, as stated or from columns, and the cells of the grids."""
-    head, values = work.run.run, {"rpm": rpm}
+    head, values = work.run.run, {"rpm": rpm} if np.isfinite(rpm).any() or work.faults else {}
     if own := work.named("cells")[:1]:
         values["cells"] = own[0].record[own[0].name]
         work.used.add(own[0].name)
@@ -300,7 +300,7 @@ def _applied(work: OpenRun, rpm: Array, loads: Mapping[str, Settled]) -> _Points
     if not {"thrust_N", "torque_Nm", "power_W", "CT", "CQ"} & values.keys():
         _nothing(work)
     elif "airspeed_m_s" not in values and "J" not in values:
-        for c in [c for c in work.columns if channel_of(c.stem) == "J" and _table(c.record)][:1]:
+        for c in [c for c in work.columns if c.coefficient[0] == "J" and _table(c.record)][:1]:
             values["J"] = c.record[c.name]
             work.used.add(c.name)
     if not work.faults:
@@ -340,12 +340,14 @@ def _unused(work: OpenRun, values: Mapping[str, Array]) -> None:
 def _coefficients(work: OpenRun, points: _Points) -> None:
     """Loads as coefficients, where a file has nothing else."""
     for c in work.columns:
-        if c.name in _COEFFICIENTS and c.name not in points.values:
-            found = settled(c.record[c.name], c.record, work.period, work.run.run.revolutions, work.end)
+        name, factor = c.coefficient
+        if name and name not in points.values:
+            found = settled(factor * c.record[c.name], c.record, work.period, work.run.run.revolutions, work.end)
             if isinstance(found, Settled):
-                points.values[c.name], points.averaged[c.name] = found.values, found.over
-                if c.name != "J":
-                    points.u[c.name] = np.full(found.values.size, math.hypot(np.nan_to_num(found.drift), found.scatter))
+                points.values[name], points.averaged[name] = found.values, found.over
+                work.used.add(c.name)
+                if name != "J":
+                    points.u[name] = np.full(found.values.size, math.hypot(np.nan_to_num(found.drift), found.scatter))
 
 
 def _conditions(
