@@ -223,7 +223,7 @@ DESIGN_POINTS = "design_points"
 _HEAD = re.compile(r"(Name\s*[,;]\s*\"?P\d|Design Points?\s*[,;])", re.IGNORECASE)
 _NAMED = re.compile(r"\"?Name\"?\s*[,;]", re.IGNORECASE)
 _POINT = re.compile(r"\"?DP ?\d+\"?\s*[,;]|Units\s*[,;]", re.IGNORECASE)
-_PARAMETER = re.compile(r"\s*(?:(P\d+) - )?(.*?)\s*(?:\[([^\]]*)\])?\s*")
+_PARAMETER = re.compile(r"\s*(?:(P\d+) - )?(.*?)\s*(?:\[[\s-]*([^\]]*?)\s*\])?\s*")
 
 
 def sniff_design_points(head: bytes | str) -> bool:

@@ -83,7 +83,7 @@ class LoadColumn:
     def coefficient(self) -> tuple[str, float]:
         """Coefficient of a propeller that the heading names, or its advance ratio, and the factor on the values."""
         head = heading(self.words)
-        known = head.unit is not None and head.name in COEFFICIENTS and not self.unit
+        known = head.unit is not None and head.name in COEFFICIENTS and self.unit in ("", "-")
         return (head.name, head.unit.factor) if known and head.unit else ("", 1.0)
 
 

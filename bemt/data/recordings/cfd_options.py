@@ -113,7 +113,7 @@ def run_from(
     density_kg_m3: float | None = None, revolutions: int | None = None, sector: int | None = None,
     axis: str | None = None,
     zones: Sequence[str] = (), unit: Sequence[str] = (), column: Sequence[str] = (), sign: Sequence[str] = (),
-    reference: Sequence[str] = (), setup: Sequence[str] = (),
+    reference: Sequence[str] = (), setup: Sequence[str] = (), ignore: Sequence[str] = (),
 ) -> RunToml:  # fmt: skip
     """Make a run of options; all their faults at once.
 
@@ -144,7 +144,7 @@ def run_from(
             columns.setdefault(quantity, {})["sign"] = found[1]
     head = {"files": tuple(files), "rpm": rpm, "airspeed_m_s": airspeed_m_s, "density_kg_m3": density_kg_m3,
             "revolutions": revolutions, "sector": sector, "axis": axis,
-            "zones": tuple(_split(zones)) or None}  # fmt: skip
+            "zones": tuple(_split(zones)) or None, "ignore": tuple(ignore) or None}  # fmt: skip
     told = _setup(setup, faults)
     if grids := _grids(files, told, faults):
         del head["files"], told["cells"]
@@ -368,13 +368,13 @@ def _read_as(file: str) -> dict[str, str]:
 
 def write_recording(
     file: str, out: str, unit: Iterable[str] = (), column: Iterable[str] = (), sign: Sequence[str] = (),
-    pole_pairs: int | None = None,
+    pole_pairs: int | None = None, ignore: Sequence[str] = (),
 ) -> Path:  # fmt: skip
     """Write a recording.toml beside a table of measurements, in the same folder; all faults of the options at once.
 
     `unit` ``NAME=UNIT``, of a quantity or a heading; `column` ``QUANTITY=HEADING``; `sign` ``QUANTITY=-1``;
-    `pole_pairs` of a speed that counts electrical revolutions. InputError on what is no column, unit or quantity, and
-    where `out` exists.
+    `pole_pairs` of a speed that counts electrical revolutions; `ignore` headings. InputError on what is no column, unit
+    or quantity, and where `out` exists.
     """
     import tomlkit
 
@@ -384,7 +384,7 @@ def write_recording(
         faults.append(Fault("", "--out", out, f"a file in the folder of {Path(file).name}", "Both stay together"))
     if path.exists():
         faults.append(Fault(path.as_posix(), "", "a file that exists", "a new name", "Add the lines to it by hand"))
-    document = recording_from(file, unit, column, sign, pole_pairs, faults)
+    document = recording_from(file, unit, column, sign, pole_pairs, faults, ignore)
     inline = {name: tomlkit.inline_table() for name in document["columns"]}
     for name, facts in document["columns"].items():
         inline[name].update(facts)
@@ -395,12 +395,15 @@ def write_recording(
 
 def recording_from(
     file: str, unit: Iterable[str] = (), column: Iterable[str] = (), sign: Sequence[str] = (),
-    pole_pairs: int | None = None, faults: Sequence[Fault] = (),
+    pole_pairs: int | None = None, faults: Sequence[Fault] = (), ignore: Sequence[str] = (),
 ) -> dict[str, Any]:  # fmt: skip
     """Tables of a recording.toml from what options say of a table of measurements; their faults come after `faults`."""
     faults = list(faults)
     table = split_table(load_text(file))
-    headings = _Measured([h for h in table.headings if h], {}, _read_as(file))
+    faults += [Fault("", "--ignore", repr(h), f"one of {some(map(repr, table.headings), 12)}")
+               for h in ignore if h not in table.headings]  # fmt: skip
+    read_as = {q: h for q, h in _read_as(file).items() if h not in ignore}
+    headings = _Measured([h for h in table.headings if h and h not in ignore], {}, read_as)
     loads = [q for q in ("thrust", "torque") if q in headings.read_as]
     if loads and list(sign) in (["-1"], ["1"]):  # turns all
         sign = [f"{q}={text}" for q in loads for text in sign]
@@ -412,7 +415,8 @@ def recording_from(
     for quantity, facts in columns.items():
         faults += headings.complete(quantity, facts)
     refuse(faults)
-    head = {"file": Path(file).name} | ({"decimal": ","} if decimal_mark(table) == "," else {})
+    head: dict[str, Any] = {"file": Path(file).name} | ({"decimal": ","} if decimal_mark(table) == "," else {})
+    head |= {"ignore": list(ignore)} if ignore else {}
     out = Collector(file)
     document = {"recording": head, "columns": columns} | ({"rotor": {"pole_pairs": pole_pairs}} if pole_pairs else {})
     validated(RecordingToml, document, out)

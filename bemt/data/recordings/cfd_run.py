@@ -137,6 +137,10 @@ def _opened(run: RunToml, folder: Path, name: str) -> tuple[OpenRun, list[tuple[
     vectors = [(f, r) for f, r in read if any(n.startswith("force_") for n in r.values)]
     homes = {zone_of(Path(f), r.format) for f, r in vectors}
     columns = [c for file, record in read for c in columns_of(file, record, len(homes) > 1)]
+    ignore, known = run.run.ignore or (), dict.fromkeys(n for c in columns for n in (c.name, c.stem))
+    if not faults:
+        faults = [Fault(name, "ignore", repr(n), f"one of {', '.join(known)}") for n in ignore if n not in known]
+    columns = [c for c in columns if c.name not in ignore and c.stem not in ignore]
     notes = [n for _, r in read for n in r.notes if "restart" in n or "joined" in n or "left out" in n]
     return OpenRun(run, name, columns, complete=not faults, notes=notes, faults=faults), read
 
@@ -332,9 +336,8 @@ def _unused(work: OpenRun, values: Mapping[str, Array]) -> None:
     stated = state and not _GRIDS & state.keys()
     apart = any(len(g) > 1 for g in groups(Dataset("cfd", "", state))) if stated else not state
     end = f": {len(rest[0].record)} rows, of which some differ in nothing else, are no repeats" if apart else ""
-    work.notes.insert(
-        0, f"not used, though the rows differ in it: {names}{end}; --column airspeed=NAME says what it is"
-    )
+    hint = "--column airspeed=NAME says what it is, --ignore NAME leaves it out"
+    work.notes.insert(0, f"not used, though the rows differ in it: {names}{end}; {hint}")
 
 
 def _coefficients(work: OpenRun, points: _Points) -> None:

@@ -218,7 +218,7 @@ def as_stated(files: Sequence[Any], run: Mapping[str, Any]) -> list[Any]:
         told = [run.get(name) or [] for name in ("unit", "column", "sign")]
         if not any(told) and run.get("rpm") is None:
             return list(files)
-        return [stated_frame(f, *told) if hasattr(f, "columns") else _stated(f, *told, run.get("rpm")) for f in files]
+        return [stated_frame(f, *told) if hasattr(f, "columns") else _stated(f, run.get("rpm"), *told) for f in files]
     return list(runs_of(files, run_from(list(files), **run), insist=True)[0])
 
 
@@ -260,7 +260,7 @@ def is_measured(file: Any) -> bool:
 
 
 def _stated(
-    file: str, unit: Sequence[str], column: Sequence[str], sign: Sequence[str], rpm: float | None
+    file: str, rpm: float | None, unit: Sequence[str], column: Sequence[str], sign: Sequence[str]
 ) -> Dataset:  # fmt: skip
     """A table of measurements as a recording.toml with these facts would read it."""
     from bemt.data.readers.recording_toml import RecordingToml, joined
