@@ -27,11 +27,12 @@ from bemt.data.readers.unit_text import (
 
 _RPM = units.UNITS["rpm"]
 _PURE = re.compile(
-    r"(CT_total|KT_total|KT_nozzle|KT_propeller|J|eta_?[0Oo]?|FM|Re|M_tip|run|tip_Mach|Mach|throttle|sigma"
+    r"(CT_total|KT_nozzle|KT_propeller|J|eta_?[0Oo]?|FM|Re|M_tip|run|tip_Mach|Mach|throttle|sigma"
     r"|[A-Za-z]\w*?/(?![NAVWKCF]\b)[A-Z]|[A-Za-z]\w*_over_[A-Za-z]|[xyz]/c|\w+_ratio|CT_rotor|CP_rotor|CQ_rotor|Cp)"
 )
 _OF_PROPELLER = re.compile(
-    r"(?P<ten>10 ?[*x·]? ?)?(?:C_?(?P<air>[TPQtq])|(?:K_?|k_)(?P<ship>[TQtq]))(?(ship)(?!\s*[(\[]\s*[^\W\d]))(?:\s*[(\[].*)?"
+    r"(?P<ten>10 ?[*x·]? ?)?(?:C_?(?P<air>[TPQtq])|(?:K_?|k_)(?P<ship>[TQtq](?:[ _]total)?))"
+    r"(?(ship)(?!\s*[(\[]\s*[^\W\d]))(?:\s*[(\[].*)?"
 )
 """Coefficients as propellers and ships have them, K_T = CT and K_Q = CQ, but a motor's Kt has a unit; Cp may be that of
 a pressure: the table tells."""
@@ -345,7 +346,7 @@ def channel_of(text: str, unit: str = "") -> str:
     return USUAL.get(name, name)
 
 
-_COEFFICIENT = re.compile(r"(thrust|power|torque) coeff(?:icient)?(?: [ck] ?[tpq])?|(adv(?:ance)? ratio)(?: j)?")
+_COEFFICIENT = re.compile(r"(thrust|power|torque) coeff(?:icient)?(?: (10 ?)?[ck] ?[tpq])?|(adv(?:ance)? (?:ratio|coefficient))(?: j)?")
 _LETTER = {"thrust": "CT", "power": "CP", "torque": "CQ"}
 
 
@@ -354,7 +355,8 @@ def _by_words(text: str) -> Heading | None:
     bare = unicodedata.normalize("NFKC", text.replace("⁻", "^-")).replace("\u2212", "-")
     words = english(re.sub(r"[(\[] ?-? ?[)\]]", " ", bare))
     if found := _COEFFICIENT.fullmatch(" ".join(words)):
-        return Heading(text, "J" if found[2] else _LETTER[found[1]], units.Unit("", "none", 1.0))
+        name, factor = "J" if found[3] else _LETTER[found[1]], 0.1 if found[2] else 1.0
+        return Heading(text, name, units.Unit("", "none", factor))
     if re.fullmatch(r"t\s*[(\[]\s*\w+\s*[)\]]", bare) and isinstance(
         unit := unit_of(bare[1:].strip(" ()[]")), units.Unit
     ):
@@ -433,7 +435,7 @@ def _without_brackets(core: str, text: str) -> tuple[str, units.Unit | None, str
     if rotor and core in ("CT", "CP", "CQ"):
         return f"{core}_rotor", pure, ""
     if (said := _OF_PROPELLER.fullmatch(text)) and not rotor:
-        return f"C{(said['air'] or said['ship']).upper()}", units.Unit("", "none", 0.1 if said["ten"] else 1.0), ""
+        return f"C{(said['air'] or said['ship'])[0].upper()}", units.Unit("", "none", 0.1 if said["ten"] else 1.0), ""
     if _PURE.fullmatch(core) and (not rotor or core.endswith("_rotor")):
         return core.replace("eta_", "eta"), pure, ""
     if re.fullmatch(r"\w+/[NAVWKCF]", core):

@@ -82,7 +82,8 @@ class LoadColumn:
     @property
     def coefficient(self) -> tuple[str, float]:
         """Coefficient of a propeller that the heading names, or its advance ratio, and the factor on the values."""
-        head = heading(self.words)
+        word = re.sub(r" \d$", "", self.words)  # STAR-CCM+ numbers its reports
+        head = heading(word.upper() if re.fullmatch("(10)?k[tq]", word) else word)
         known = head.unit is not None and head.name in COEFFICIENTS and self.unit in ("", "-")
         return (head.name, head.unit.factor) if known and head.unit else ("", 1.0)
 
