@@ -346,7 +346,9 @@ def channel_of(text: str, unit: str = "") -> str:
     return USUAL.get(name, name)
 
 
-_COEFFICIENT = re.compile(r"(thrust|power|torque) coeff(?:icient)?(?: (10 ?)?[ck] ?[tpq])?|(adv(?:ance)? (?:ratio|coefficient))(?: j)?")
+_COEFFICIENT = re.compile(
+    r"(thrust|power|torque) coeff(?:icient)?(?: (10 ?)?[ck] ?[tpq])?|(adv(?:ance)? (?:ratio|coefficient))(?: j)?"
+)
 _LETTER = {"thrust": "CT", "power": "CP", "torque": "CQ"}
 
 
