@@ -406,7 +406,8 @@ def _dataset(work: OpenRun, points: _Points, read: Sequence[tuple[str, Dataset]]
 
 
 _SHOWN = {"rpm": "rev/min", "airspeed_m_s": "V [m/s]", "J": "J", "thrust_N": "thrust [N]",
-          "duct_thrust_N": "of it duct [N]", "torque_Nm": "torque [N m]", "power_W": "power [W]", "CT": "CT", "CQ": "CQ", "CP": "CP"}  # fmt: skip
+          "duct_thrust_N": "of it duct [N]", "torque_Nm": "torque [N m]", "power_W": "power [W]",
+          "CT": "CT", "CQ": "CQ", "CP": "CP"}  # fmt: skip
 
 
 def _with_u(x: float, u: float) -> str:
