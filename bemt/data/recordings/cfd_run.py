@@ -100,6 +100,7 @@ def _sum(parts: Sequence[tuple[float, Settled]]) -> Settled:
     )  # fmt: skip
 
 
+@np.errstate(over="ignore")  # a damaged file may hold any number
 def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> CfdRun:
     """Points of a run: rpm, thrust, torque, the duct's part, with u, and how each was averaged.
 
