@@ -411,28 +411,23 @@ def _wall_name(duct: Duct, radius: Array, x: Array) -> str:
     return "duct_inner" if np.sum(radius - middle) < 0.0 else "duct_outer"
 
 
-BOX = (10.0, 5.0, 10.0)
-"""Far field in diameters: width of the box, reach upstream and downstream [1]."""
+WIDE = 10.0
+"""Width of the far field in diameters [1]."""
 
 
 def flow_domain(
-    parts: Parts,
-    rotor: Rotor,
-    duct: Duct | None = None,
-    wide: float = BOX[0],
-    ahead: float = BOX[1],
-    behind: float = BOX[2],
+    parts: Parts, rotor: Rotor, duct: Duct | None = None, wide: float = WIDE
 ) -> tuple[Any, list[tuple[Any, str]]]:
     """Air round a rotor and its duct as one solid in millimetres, a box less the parts, and its faces with their names.
 
-    `wide` is the width of the box, `ahead` and `behind` its reach upstream (+z) and downstream, in diameters [1].
+    `wide` is the width of the box in diameters [1]; it reaches half of it upstream (+z) and all of it downstream.
     Names as `named_faces` has them, and ``far_field_inlet``, ``far_field_outlet``, ``far_field_side``.
     """
     cq = needs("cadquery", "cad")
 
     D = rotor.D * MM
-    low = cq.Vector(-0.5 * wide * D, -0.5 * wide * D, -behind * D)
-    box = cq.Solid.makeBox(wide * D, wide * D, (ahead + behind) * D, low)
+    low = cq.Vector(-0.5 * wide * D, -0.5 * wide * D, -wide * D)
+    box = cq.Solid.makeBox(wide * D, wide * D, 1.5 * wide * D, low)
     air = _one(box.cut(*(solid for _, _, solid in parts.solids)), "flow")
     walls = [(face, word, face.BoundingBox()) for _, face, word in named_faces(parts, rotor, duct)]
     out = []

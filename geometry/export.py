@@ -55,9 +55,12 @@ class Written(NamedTuple):
 
 def export(
     rotor: Rotor, duct: Duct | None, out: Path, formats: Sequence[str], *, name: str = "rotor", unit: str = "mm",
-    options: Options | None = None, model: MeshModel | None = None,
+    options: Options | None = None, model: MeshModel | None = None, box: float | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Write the solids of a rotor and its duct; `model` is their mesh with these options, if there is one already."""
+    """Write the solids of a rotor and its duct; `model` is their mesh with these options, if there is one already.
+
+    `box` is the width of the far field over the diameter, of the format flow [1].
+    """
     faults = Faults()
     for word in formats:
         if word not in FORMATS:
@@ -74,7 +77,7 @@ def export(
         files: list[Written] = []
         volumes = {k: v for k, v in model.checks.items() if k.startswith("volume")}
         for word in dict.fromkeys(formats):
-            files += _written(word, rotor, duct, work, name, unit, model, volumes)
+            files += _written(word, rotor, duct, work, name, unit, model, volumes, box)
         manifest = {
             "schema": SCHEMA, "name": name, "blades": rotor.B, "rotation": "right" if rotor.rotation > 0 else "left",
             "diameter_m": rotor.D, "hub_diameter_m": 2 * rotor.Rhub, "frame": FRAME,
@@ -101,7 +104,7 @@ def export(
 
 def _written(
     word: str, rotor: Rotor, duct: Duct | None, work: Path, name: str, unit: str, model: MeshModel,
-    volumes: dict[str, float],
+    volumes: dict[str, float], box: float | None,
 ) -> list[Written]:  # fmt: skip
     """Write one format."""
     if word == "openfoam":
@@ -115,7 +118,9 @@ def _written(
     with kernel(word, "a solid that it makes", "Use stl, obj, 3mf or openfoam, which need no kernel"):
         if word == "step":
             return [_step(rotor, duct, work, name, unit, model, volumes)]
-        return (_flow if word == "flow" else _zone)(rotor, duct, work, name, unit, model)
+        if word == "zone":
+            return _zone(rotor, duct, work, name, unit, model)
+        return _flow(rotor, duct, work, name, unit, model, box)
 
 
 def _rounded(value: Any) -> Any:
@@ -294,16 +299,16 @@ def _step(
 
 
 def _flow(
-    rotor: Rotor, duct: Duct | None, work: Path, name: str, unit: str, model: MeshModel
+    rotor: Rotor, duct: Duct | None, work: Path, name: str, unit: str, model: MeshModel, box: float | None
 ) -> list[Written]:  # fmt: skip
     """Air round the parts, in a box, its faces named."""
-    from geometry.cad import BOX, flow_domain, solids
+    from geometry.cad import WIDE, flow_domain, solids
 
     _aerodynamic("flow", model)
-    air, faces = flow_domain(solids(rotor, duct, model.options), rotor, duct)
-    wide, ahead, behind = BOX
-    says = (f"far field {wide:g} D wide ({wide * rotor.D:.4g} m), {ahead:g} D ahead of the rotor, "
-            f"{behind:g} D behind it")  # fmt: skip
+    wide = box or WIDE
+    air, faces = flow_domain(solids(rotor, duct, model.options), rotor, duct, wide)
+    says = (f"far field {wide:g} D wide ({wide * rotor.D:.4g} m), {0.5 * wide:g} D ahead of the rotor, "
+            f"{wide:g} D behind it")  # fmt: skip
     return [_one_body(work, f"{name}_flow.step", "flow", "flow", air, faces, unit, says)]
 
 

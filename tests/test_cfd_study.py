@@ -376,3 +376,103 @@ def test_what_a_run_holds_beside_its_load_is_named_before_a_unit(tmp_path: Path,
     with pytest.raises(InputError, match="got a column of pressure for the thrust"):
         (tmp_path / "fan.csv").write_text("Design Points,rpm [rpm],total-pressure-op,torque [N m]\nDP0,6000,25,0.06\n")
         assemble(run_from([str(tmp_path / "fan.csv")], column=["thrust=total-pressure-op"], unit=["thrust=N"]))
+
+
+@pytest.mark.parametrize("head", ["K_T [-]", "Kt [ ]", "KT", "K_T", "C_T", "thrust coefficient K_T"])
+@pytest.mark.parametrize("ten", ["10K_Q [-]", "10*KQ", "10 Kq", "K_Q"])
+@pytest.mark.parametrize("program", [workbench, cfd_post, table])
+def test_coefficients_of_a_ship_are_made_loads_by_the_case(
+    project: Path, tmp_path: Path, program: Callable[..., str], head: str, ten: str
+) -> None:
+    """K_T = T/(rho n^2 D^4) and K_Q = Q/(rho n^2 D^5) are CT and CQ; a unit that is stated for them is refused."""
+    factor = 0.1 if ten.startswith("10") else 1.0
+    rows = "".join(f"{J},{T},{Q / factor:.6g}\n" for J, T, Q in ((0.0, 0.11, 0.01), (0.3, 0.08, 0.009)))
+    bare = program([("J", ""), (head, ""), (ten, "")]).rstrip("\n").split("\n")
+    lead = [f"DP {k}," if program is workbench else "" for k in range(2)]
+    text = "\n".join([*bare[:-4], *(a + b for a, b in zip(lead, rows.splitlines(), strict=True))]) + "\n"
+    (tmp_path / "a.csv").write_text(text)
+    found = points(tmp_path / "a.csv")
+    assert found["J"] == pytest.approx([0.0, 0.3]) and "rpm" not in found
+    assert found["CT"] == pytest.approx([0.11, 0.08]) and found["CQ"] == pytest.approx([0.01, 0.009])
+    if head == "K_T [-]" and ten == "K_Q":
+        file, case = tmp_path / "a.csv", load_case(project / "cases" / "prop_8x5")
+        one = compare(file, case=case, rpm=6000.0, figures=False).to_dict()["points"][1]
+        n, D = 100.0, case.diameter_m
+        assert one["loads"]["thrust_N"]["cfd"] == pytest.approx(0.08 * case.air().rho * n**2 * D**4, rel=1e-6)
+        assert one["airspeed_m_s"] == pytest.approx(0.3 * n * D)
+        with pytest.raises(InputError, match="Leave (it|out its unit).* by density, speed and diameter of the case"):
+            compare(file, case=case, rpm=6000.0, unit={"K_T [-]" if program is table else "K_T": "N"})
+
+
+def test_a_constant_of_a_motor_is_no_coefficient_and_an_airspeed_needs_the_speed(tmp_path: Path, project: Path) -> None:
+    rows = "4,100,0.08,0.009\n8,100,0.06,0.008\n"
+    (tmp_path / "a.csv").write_text("V [m s^-1],n [s^-1],Kt [N m/A],K_T\n" + rows)
+    assert import_file(tmp_path / "a.csv").unit("CT") == "-" and len(import_file(tmp_path / "a.csv").values) == 4
+    with pytest.raises(InputError, match="a speed and a load"):  # what n counts is not said
+        compare(tmp_path / "a.csv", case=project / "cases" / "prop_8x5")
+
+
+@pytest.mark.parametrize("order", ["by grid", "by kind"])
+def test_a_grid_has_one_file_of_each_kind(tmp_path: Path, order: str) -> None:
+    thrusts = histories(tmp_path)
+    torques = []
+    for file in thrusts:
+        text = Path(file).read_text().replace('"t"', '"q"').replace('"thrust" "torque")', '"Q" "torque-op")')
+        torques.append(str(Path(file).with_name("q" + Path(file).name)))
+        Path(torques[-1]).write_text(text)
+    pairs = [f for pair in zip(thrusts, torques, strict=True) for f in pair]
+    files = pairs if order == "by grid" else [*thrusts, *torques]
+    told = {"rpm": 6000.0, "unit": ["thrust=N", "torque-op=N m"]}
+    run = run_from(files, **told, setup=["cells=0.5e6,1.7e6,5.8e6"])
+    assert [g.files for g in run.grids] == list(zip(thrusts, torques, strict=True))
+    is_the_study(assemble(run))
+    each = "0.5e6,0.5e6,1.7e6,1.7e6,5.8e6,5.8e6" if order == "by grid" else "0.5e6,1.7e6,5.8e6,0.5e6,1.7e6,5.8e6"
+    assert run_from(files, **told, setup=[f"cells={each}"]).grids == run.grids
+    with pytest.raises(InputError, match="5 files"):
+        run_from(files[:5], **told, setup=["cells=0.5e6,1.7e6,5.8e6"])
+
+
+def test_values_that_do_not_differ_are_no_study_of_the_grid() -> None:
+    d = CfdRun("cfd", "a", {"rpm": [6e3] * 3, "thrust_N": [7.5] * 3, "torque_Nm": [0.107, 0.111, 0.1125]})
+    found = by_grid(d, np.array([0.5e6, 1.7e6, 5.8e6]))
+    assert found.u["thrust_N"][0] == pytest.approx(7.5 * grid_floor("thrust_N", False))
+    assert found.u["torque_Nm"][0] < 0.02 * 0.1125
+    assert any("7.5, 7.5, 7.5 N; the values do not differ" in note for note in found.notes)
+
+
+def test_a_table_of_grids_is_shown_as_the_study_that_it_is(tmp_path: Path) -> None:
+    (tmp_path / "g.csv").write_text("cells,rpm,thrust [N]\n" + "".join(f"{n},6000,{T}\n" for n, T in GRIDS.items()))
+    assert "order 2.22" in import_(tmp_path / "g.csv").text
+
+
+@pytest.mark.parametrize(
+    ("factor", "fluid"), [(998.0 / 1.225, "water"), (1.0 / 1.225, "a fluid of 1 kg/m3"), (1.7, "")]
+)
+def test_another_density_is_the_first_thing_to_check(project: Path, tmp_path: Path, factor: float, fluid: str) -> None:
+    case = load_case(project / "cases" / "prop_8x5")
+    from bemt.rotors.case.propagate import propagate
+
+    n = np.array([4000.0, 8000.0])
+    d = propagate(case, n, 0.0 * n, case.air().rho + 0.0 * n).points
+    head, rows = "rpm,thrust [N],torque [N m],cells", zip(n, d["thrust_N"], d["torque_Nm"], strict=True)
+    lines = [f"{a},{factor * T:.6g},{factor * Q:.6g},2e6" for a, T, Q in rows]
+    (tmp_path / "a.csv").write_text("\n".join([head, *lines]) + "\n")
+    said = compare(tmp_path / "a.csv", case=case, figures=False).to_dict()["sentence"]
+    assert ("first check the density" in said) == bool(fluid) and fluid in said
+    (tmp_path / "a.csv").write_text("\n".join([f"{head},rho [kg/m3]", *(f"{line},1.225" for line in lines)]) + "\n")
+    assert "density" not in compare(tmp_path / "a.csv", case=case, figures=False).to_dict()["sentence"]
+
+
+def test_a_column_can_be_left_out(tmp_path: Path) -> None:
+    text = workbench([("rpm", "rev min^-1"), ("angle", "degree"), ("thrust", "N"), ("thrust 2", "N")])
+    (tmp_path / "a.csv").write_text(text)
+    found = assemble(run_from([str(tmp_path / "a.csv")], ignore=["angle", "thrust 2"]))
+    assert found["thrust_N"] == pytest.approx(LOADS) and not any("not used" in note for note in found.notes)
+    with pytest.raises(InputError, match="'wibble'"):
+        assemble(run_from([str(tmp_path / "a.csv")], ignore=["wibble"]))
+    (tmp_path / "b.csv").write_text("rpm,thrust (N),balance (N)\n4000,1,7\n6000,2,8\n8000,4,9\n")
+    import_(
+        tmp_path / "b.csv", ignore=["thrust (N)"], column={"thrust": "balance (N)"}, out=tmp_path / "recording.toml"
+    )
+    kept = import_file(tmp_path / "recording.toml")
+    assert kept["thrust_N"] == pytest.approx([7.0, 8.0, 9.0]) and set(kept.values) == {"rpm", "thrust_N"}

@@ -367,6 +367,13 @@ def test_the_zone_that_turns_holds_the_rotor_and_no_vane(tmp_path: Path) -> None
     assert closed.volume == pytest.approx(solid.Volume(), rel=2e-3)
 
 
+def test_the_far_field_is_as_wide_as_stated(tmp_path: Path) -> None:
+    rotor = Rotor(helix(0.1, 0.1, "fan", hub=0.35, anchors=naca4(0.04, 0.4, 0.1)), 2)
+    (made,) = export(rotor, None, tmp_path, ["flow"], name="fan", box=20.0)["files"]
+    box = 20.0 * 20.0 * 30.0 * rotor.D**3  # half of the width ahead of the rotor, all of it behind
+    assert made["surfaces"][0]["volume_m3"] == pytest.approx(box, rel=1e-3)
+
+
 def test_no_vane_stands_on_a_seam() -> None:
     """A vane whose edges lie on the seams of duct and body left no air at all: fans of 70 and 254 mm."""
     rotor = Rotor(helix(0.07, 0.1, "fan", hub=0.35, anchors=naca4(0.04, 0.4, 0.1)), 2)

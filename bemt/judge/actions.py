@@ -150,7 +150,7 @@ def compare(
     air_a, air_b : str, optional
         Air of `a` or `b`, overrides the recording: 22C,1013hPa, or only 22C, or 1.19kg/m3; wind: 18m/s, 35kt.
     rpm : float, optional
-        One CFD run: its speed, where no file states it. [rev/min]
+        One file beside the case: its speed, where no file states it. [rev/min]
     unit, column, sign : mapping
         What the headings of both tables, or the exports of one CFD run, do not say: thrust=N, thrust=fz, torque=-1.
     zones : sequence of str

@@ -29,7 +29,8 @@ def import_(
     picture: File | None = None, unit: Mapping[str, str] = {}, column: Mapping[str, str] = {},  # noqa: B006
     sign: Mapping[str, str] = {}, sector: Count | None = None, zones: Sequence[str] = (),  # noqa: B006
     axis: Literal["x", "y", "z"] | None = None, airspeed_m_s: float | None = None, density_kg_m3: float | None = None,
-    reference: Mapping[str, str] = {}, setup: Mapping[str, str] = {}, out: File | None = None,  # noqa: B006
+    reference: Mapping[str, str] = {}, setup: Mapping[str, str] = {}, ignore: Sequence[str] = (),  # noqa: B006
+    out: File | None = None,
 ) -> Told:  # fmt: skip
     r"""Read CFD, bench or vendor data: channels, means, drift, warnings.
 
@@ -73,7 +74,9 @@ def import_(
         What coefficients rest on: area=A length=L speed=V density=RHO sound=A. [m2, m, m/s, kg/m3, m/s]
     setup : mapping
         How it was computed: cells=2.1e6 grid_level=fine turbulence='k-omega SST' solver=pressure steady=no gci_pct=2;
-        cells=0.5e6,1.7e6,5.8e6 makes a grid study of three files.
+        cells=0.5e6,1.7e6,5.8e6 makes a grid study of three folders, or of three files of each kind.
+    ignore : sequence of str
+        Headings of columns that count for nothing.
     out : path, optional
         File that keeps what you state: run.toml, study.toml of several grids or recording.toml; every command takes it
         in place of the files.
@@ -111,20 +114,21 @@ def import_(
     told: dict[str, list[str]] = {"unit": words(unit), "column": words(column), "sign": words(sign)}
     run: dict[str, Any] = {"sector": sector, "zones": list(zones), "axis": axis, "airspeed_m_s": airspeed_m_s,
            "density_kg_m3": density_kg_m3, "reference": words(reference), "setup": words(setup)}  # fmt: skip
+    left = [os.fspath(heading) for heading in ([ignore] if isinstance(ignore, str) else ignore)]
     stated: dict[str, Any] = {}
     said = ""
-    lines, insist = [], any(told.values()) or any(run.values()) or bool(out is not None or pole_pairs)
+    lines, insist = [], any((*told.values(), *run.values(), left, out is not None, pole_pairs))
     table = names[0] if len(names) == 1 and not any(run.values()) and load.is_measured(names[0]) else ""
-    if insist and table and (out is not None or pole_pairs):
+    if insist and table and (out is not None or pole_pairs or left):
         from bemt.data.recordings.cfd_options import write_recording
 
-        if out is None:  # pole pairs are of the rotor, which a file keeps
+        if out is None:  # no command takes these two: a file keeps them
             hint = f"Add --out {Path(table).with_name('recording.toml').as_posix()}"
             raise InputError(Fault("", "--out", "nothing", "a recording.toml that keeps what you state", hint))
         facts = told["unit"], told["column"], told["sign"], pole_pairs
-        written = write_recording(table, os.fspath(out), *facts).as_posix()
+        written = write_recording(table, os.fspath(out), *facts, ignore=left).as_posix()
         kept = written
-        names, told, out, insist = [written], dict.fromkeys(told, []), None, False
+        names, told, out, left, insist = [written], dict.fromkeys(told, []), None, [], False
     elif insist and table:
         stated = {table: load.as_stated([table], told)[0]}
         said = " ".join(shlex.join([f"--{name}", *given]) for name, given in told.items() if given)
@@ -133,7 +137,7 @@ def import_(
         raise InputError(Fault("", "--pole-pairs", f"{pole_pairs} with these files", "one table of measurements"))
     speed = None if choice.period is None else 60.0 / choice.period
     made = cfd_options.run_from(names, rpm=speed, revolutions=revolutions, **run, unit=told["unit"],
-                                column=told["column"], sign=told["sign"])  # fmt: skip
+                                column=told["column"], sign=told["sign"], ignore=left)  # fmt: skip
     found = load.import_files(names, format, choice, made, insist, stated)
     if out is not None and found.runs:
         own = made.run.model_copy(update={"files": found.runs[-1].files})
@@ -142,8 +146,8 @@ def import_(
     document = found.document()
     if case is not None:
         runs: list[Any] = [] if wrote else load.runs_of(names, made)[0]  # as the options say, not as the files do
-        left = [f.path for f in found.files if f.record is None or f.record.kind != "cfd"] if runs else names
-        rest = [stated.get(name, name) for name in left]
+        others = [f.path for f in found.files if f.record is None or f.record.kind != "cfd"] if runs else names
+        rest = [stated.get(name, name) for name in others]
         seen = [wrote] if wrote else [*runs, *rest]
         sentence, document["prediction"] = _beside(seen, case, picture, rpm, airspeed_m_s, bool(wrote or runs))
         lines.append(f"{sentence}\n")

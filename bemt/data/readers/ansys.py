@@ -81,9 +81,9 @@ def _heading(text: str) -> Column:
     match = _HEADING.fullmatch(text)
     if not match:
         return Column(text or "unnamed")
-    unit = si_unit(match[2])
+    unit, stated = si_unit(match[2]), match[2].strip(" -")
     if unit is None:
-        return Column(text if match[2].strip() else slug(match[1]), match[2].strip())
+        return Column(text if stated else match[1], stated)
     role = "time" if unit == "s" and slug(match[1]) in ("time", "flow_time", "physical_time") else "value"
     if unit == "rpm" and may_be_shaft_speed(match[1]):
         return Column("rpm", unit)
@@ -223,7 +223,7 @@ DESIGN_POINTS = "design_points"
 _HEAD = re.compile(r"(Name\s*[,;]\s*\"?P\d|Design Points?\s*[,;])", re.IGNORECASE)
 _NAMED = re.compile(r"\"?Name\"?\s*[,;]", re.IGNORECASE)
 _POINT = re.compile(r"\"?DP ?\d+\"?\s*[,;]|Units\s*[,;]", re.IGNORECASE)
-_PARAMETER = re.compile(r"\s*(?:(P\d+) - )?(.*?)\s*(?:\[([^\]]*)\])?\s*")
+_PARAMETER = re.compile(r"\s*(?:(P\d+) - )?(.*?)\s*(?:\[[\s-]*([^\]]*?)\s*\])?\s*")
 
 
 def sniff_design_points(head: bytes | str) -> bool:

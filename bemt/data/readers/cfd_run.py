@@ -77,6 +77,7 @@ class RunHead(Table):
     axis: Literal["x", "y", "z"] | None = entry("axis of the shaft; the largest force if omitted")
     zones: tuple[str, ...] | None = entry("zones whose loads count, duct included")
     duct_zones: tuple[str, ...] | None = entry("those of the zones that are the duct; by their names if omitted")
+    ignore: tuple[str, ...] | None = entry("headings that count for nothing")
 
 
 class GridTable(Table):

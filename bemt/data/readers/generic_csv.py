@@ -162,6 +162,8 @@ def heads_of(table: SplitTable | NumberTable) -> list[Heading]:
     heads = heads or [Heading("", f"column_{k + 1}", None) for k in range(table.width)]
     if any(head.name == "CT" for head in heads):  # beside a thrust coefficient, Cp is that of the power
         heads = [replace(h, name={"Cp": "CP", "Cq": "CQ"}.get(h.name, h.name)) for h in heads]
+    if any(head.name == "CT" and head.text.upper().startswith("K") for head in heads):  # a ship's C_T is a loading
+        heads = [replace(h, name=slug(h.text), unit=None) if h.text.upper().startswith("C") else h for h in heads]
     if {"V", "A"} <= {head.text.upper() for head in heads}:  # the units of what a drive takes
         heads = [replace(heading(_DRIVE.get(h.text.upper(), h.text)), text=h.text) if h.text else h for h in heads]
     return _apart(heads)

@@ -27,11 +27,15 @@ from bemt.data.readers.unit_text import (
 
 _RPM = units.UNITS["rpm"]
 _PURE = re.compile(
-    r"(CT|CP|CQ|KT|KQ|10KQ|CT_total|KT_total|KT_nozzle|KT_propeller|J|eta0?|FM|Re|M_tip|run|tip_Mach|Mach|throttle|sigma"
-    r"|[A-Za-z]\w*?/(?![NAVWKCF]\b)[A-Z]|[A-Za-z]\w*_over_[A-Za-z]|[xyz]/c|\w+_ratio|CT_rotor|CP_rotor|CQ_rotor"
-    r"|C_[TPQ]|C[tpq])"
+    r"(CT_total|KT_nozzle|KT_propeller|J|eta_?[0Oo]?|FM|Re|M_tip|run|tip_Mach|Mach|throttle|sigma"
+    r"|[A-Za-z]\w*?/(?![NAVWKCF]\b)[A-Z]|[A-Za-z]\w*_over_[A-Za-z]|[xyz]/c|\w+_ratio|CT_rotor|CP_rotor|CQ_rotor|Cp)"
 )
-_PURE_NAMES = {"Ct": "CT", "C_T": "CT", "C_P": "CP", "C_Q": "CQ"}  # Cp may be that of a pressure: the table tells
+_OF_PROPELLER = re.compile(
+    r"(?P<ten>10 ?[*x·]? ?)?(?:C_?(?P<air>[TPQtq])|(?:K_?|k_)(?P<ship>[TQtq](?:[ _]total)?))"
+    r"(?(ship)(?!\s*[(\[]\s*[^\W\d]))(?:\s*[(\[].*)?"
+)
+"""Coefficients as propellers and ships have them, K_T = CT and K_Q = CQ, but a motor's Kt has a unit; Cp may be that of
+a pressure: the table tells."""
 _ALONE = {  # a heading that is the name of a unit
     "volts": ("voltage", "V"), "volt": ("voltage", "V"), "amps": ("current", "A"), "amp": ("current", "A"),
     "amperes": ("current", "A"), "watts": ("P", "W"), "newtons": ("F", "N"),
@@ -342,7 +346,9 @@ def channel_of(text: str, unit: str = "") -> str:
     return USUAL.get(name, name)
 
 
-_COEFFICIENT = re.compile(r"(thrust|power|torque) coeff(?:icient)?(?: c ?[tpq]| c[tpq])?|(adv(?:ance)? ratio)(?: j)?")
+_COEFFICIENT = re.compile(
+    r"(thrust|power|torque) coeff(?:icient)?(?: (10 ?)?[ck] ?[tpq])?|(adv(?:ance)? (?:ratio|coefficient))(?: j)?"
+)
 _LETTER = {"thrust": "CT", "power": "CP", "torque": "CQ"}
 
 
@@ -351,7 +357,8 @@ def _by_words(text: str) -> Heading | None:
     bare = unicodedata.normalize("NFKC", text.replace("⁻", "^-")).replace("\u2212", "-")
     words = english(re.sub(r"[(\[] ?-? ?[)\]]", " ", bare))
     if found := _COEFFICIENT.fullmatch(" ".join(words)):
-        return Heading(text, "J" if found[2] else _LETTER[found[1]], units.Unit("", "none", 1.0))
+        name, factor = "J" if found[3] else _LETTER[found[1]], 0.1 if found[2] else 1.0
+        return Heading(text, name, units.Unit("", "none", factor))
     if re.fullmatch(r"t\s*[(\[]\s*\w+\s*[)\]]", bare) and isinstance(
         unit := unit_of(bare[1:].strip(" ()[]")), units.Unit
     ):
@@ -429,8 +436,10 @@ def _without_brackets(core: str, text: str) -> tuple[str, units.Unit | None, str
     rotor, pure = "rotor convention" in text, units.Unit("", "none", 1.0)
     if rotor and core in ("CT", "CP", "CQ"):
         return f"{core}_rotor", pure, ""
+    if (said := _OF_PROPELLER.fullmatch(text)) and not rotor:
+        return f"C{(said['air'] or said['ship'])[0].upper()}", units.Unit("", "none", 0.1 if said["ten"] else 1.0), ""
     if _PURE.fullmatch(core) and (not rotor or core.endswith("_rotor")):
-        return _PURE_NAMES.get(core, core), pure, ""
+        return core.replace("eta_", "eta"), pure, ""
     if re.fullmatch(r"\w+/[NAVWKCF]", core):
         return text, None, f"{core!r} is a ratio, or a quantity and its unit: write the unit in brackets"
     if re.fullmatch(r"rpm([_ ]\w+)?|\w+[_ ]rpm", core, re.IGNORECASE):

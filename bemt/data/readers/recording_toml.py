@@ -88,6 +88,7 @@ class RecordingHead(Table):
     )
     header: bool | None = entry("false: the first line is data; detected if omitted")
     uncertainty_source: str | None = entry("source of the uncertainties")
+    ignore: tuple[str, ...] = entry("headings that count for nothing", default=())
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -199,7 +200,7 @@ class RecordingToml(Table):
 
     def rules(self) -> Iterable[tuple[str, ...]]:
         """Something that the table does not say itself."""
-        if not any(part.given() for part in (self.columns, self.rotor, self.air, self.stand)):
+        if not (self.recording.ignore or any(p.given() for p in (self.columns, self.rotor, self.air, self.stand))):
             yield "columns", "a table without channels", "a table with one channel or more, [air], [rotor] or [stand]"
 
 
@@ -316,6 +317,8 @@ def _run(file: str, path: Path, made: RecordingToml) -> Dataset:
     decimal = decimal_mark(table) if isinstance(table, SplitTable) and not stated else head.decimal
     build = Builder(table, KIND, decimal=decimal)
     heads = heads_of(table)
+    known = f"one of {some((repr(h) for h in table.headings if h), 12)}"
+    refuse(Fault(file, "recording.ignore", repr(h), known) for h in head.ignore if h not in table.headings)
     for k in sorted(range(width), key=lambda k: k not in places):
         text = table.headings[k] if table.headings else ""
         if k in places:
@@ -327,7 +330,7 @@ def _run(file: str, path: Path, made: RecordingToml) -> Dataset:
                 where = f"columns.{places[k]}.column"
                 build.faults.append(Fault(file, where, f"column {k + 1} without numbers", "a column of numbers"))
             del build.unitless[rows:]
-        else:
+        elif text not in head.ignore:
             build.add(k, heads[k])
     if not build.faults:
         only_ones(build)

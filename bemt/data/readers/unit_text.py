@@ -78,6 +78,9 @@ _ANY_CASE = {"v": "V", "a": "A", "w": "W", "n": "N", "nm": "Nm", "gf": "gf", "kg
 """Units that capitals do not change where the quantity is known."""
 
 
+BY_THE_CASE = "a coefficient becomes a load by density, speed and diameter of the case, or the stated ones"
+
+
 def si_name(unit: units.Unit) -> str:
     """Unit after conversion: SI, ``rpm``, "-" without dimension."""
     if unit.dimension in ("none", "fraction"):

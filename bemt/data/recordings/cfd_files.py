@@ -32,7 +32,7 @@ EXPORT = (
 """Where loads come from."""
 SEVERAL = (
     "Several runs? Import each with --out, then give the .toml files together. A restart with its own clock: alone. "
-    "One condition on several grids: --setup cells=a,b,c, a number for each folder"
+    "One condition on several grids: --setup cells=a,b,c, a number for each grid"
 )
 SCATTERED = 0.02
 """Spread of the means of single revolutions above which a load is not periodic. [1]"""
@@ -102,8 +102,8 @@ def _joined(read: list[tuple[str, Dataset]], faults: list[Fault]) -> list[tuple[
     out: list[tuple[str, Dataset]] = []
     others: list[str] = []
     for name, record in read:
-        home = _home(name, record)
-        at = next((k for k, (file, other) in enumerate(out) if home == _home(file, other)), None)
+        home = home_of(name, record)
+        at = next((k for k, (file, other) in enumerate(out) if home == home_of(file, other)), None)
         if at is None or record.clock not in ("time", "iteration"):
             out.append((name, record))
             continue
@@ -130,7 +130,7 @@ def _joined(read: list[tuple[str, Dataset]], faults: list[Fault]) -> list[tuple[
     return out
 
 
-def _home(name: str, record: Dataset) -> tuple[str, str, tuple[str, ...]]:
+def home_of(name: str, record: Dataset) -> tuple[str, str, tuple[str, ...]]:
     """What the parts of one history have in common: format, function object, columns."""
     form = record.format
     return form, zone_of(Path(name), form), tuple(record.values)

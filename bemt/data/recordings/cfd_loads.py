@@ -18,7 +18,8 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault
 from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import QUANTITIES, RunColumn, RunToml
-from bemt.data.readers.headings import CELLS, channel_of, may_be_shaft_speed, meanings, other_dimension
+from bemt.data.readers.headings import CELLS, channel_of, heading, may_be_shaft_speed, meanings, other_dimension
+from bemt.data.readers.unit_text import BY_THE_CASE
 from bemt.data.recordings.cfd_files import Settled, settled, zone_of
 from bemt.data.recordings.cfd_setup import Elsewhere
 from bemt.physics.dataset import Dataset
@@ -53,6 +54,7 @@ CHANNEL = {"thrust": "thrust_N", "duct_thrust": "duct_thrust_N", "torque": "torq
 """Channel of a load."""
 _VECTOR = {"thrust": "force", "torque": "moment"}
 _TOTAL = re.compile(r"(total[-_ ]?)?(thrust|torque)([-_ ](total|op))*", re.IGNORECASE)
+COEFFICIENTS = ("CT", "CQ", "CP", "J")
 _MEANT = CHANNEL | {"airspeed": "airspeed_m_s", "density": "density_kg_m3"}
 _DISK = re.compile(r"(Disk\d+)_(Force|Moment|Power)(?:_([xyz]))?")  # Flow360: BET and actuator disks
 
@@ -70,6 +72,20 @@ class LoadColumn:
     unit: str
     record: Dataset
     of_sound: bool = False  # made dimensionless by the speed of sound and one unit of the grid
+
+    @property
+    def words(self) -> str:
+        """Heading without what programs append, and without its unit."""
+        word = re.sub(r"[-_ ](op|rfile)$", "", self.stem)
+        return word.removesuffix(f"_{self.unit}") if self.unit else word
+
+    @property
+    def coefficient(self) -> tuple[str, float]:
+        """Coefficient of a propeller that the heading names, or its advance ratio, and the factor on the values."""
+        word = re.sub(r" \d$", "", self.words)  # STAR-CCM+ numbers its reports
+        head = heading(word.upper() if re.fullmatch("(10)?k[tq]", word) else word)
+        known = head.unit is not None and head.name in COEFFICIENTS and self.unit in ("", "-")
+        return (head.name, head.unit.factor) if known and head.unit else ("", 1.0)
 
 
 def columns_of(file: str, record: Dataset, several: bool) -> list[LoadColumn]:
@@ -148,9 +164,11 @@ class OpenRun:
                 self.fault(None, f"columns.{quantity}.column", repr(told), f"one of {known}")
             dimension = QUANTITIES[quantity][0]
             for c in hits[:1]:
-                if not unit_of(c.unit) and (other := other_dimension(c.stem, dimension)):
+                other = "" if unit_of(c.unit) else c.coefficient[0] or other_dimension(c.stem, dimension)
+                if other:
                     got = f"a column of {other.replace('_', ' ')} for the {quantity}"
-                    self.fault(c, c.name, got, f"one of {dimension.replace('_', ' ')}")
+                    hint = f"Leave out its unit: {BY_THE_CASE}" if c.coefficient[0] else ""
+                    self.fault(c, c.name, got, f"one of {dimension.replace('_', ' ')}", hint)
             return hits
         taken = {getattr(self.run.columns, q).column for q in QUANTITIES if getattr(self.run.columns, q) is not None}
         return _recorded(
@@ -250,7 +268,10 @@ class OpenRun:
                 self._another_speed(own, head.rpm)
             return np.array([head.rpm])
         if not own:
-            self.fault(None, "rpm", "no speed of rotation", "rev/min of the run", "--rpm N; run.toml: [run] rpm = N")
+            loads = any(_fits(c, q) for c in self.columns for q in (*CHANNEL, "airspeed"))
+            if loads or not any(c.coefficient[0] and c.record.clock == "none" for c in self.columns):
+                hint = "--rpm N; run.toml: [run] rpm = N"
+                self.fault(None, "rpm", "no speed of rotation", "rev/min of the run", hint)
             return np.array([math.nan])
         values, record = self.si("rpm", own[0]), own[0].record
         if values is None:
@@ -292,8 +313,7 @@ def _fits(c: LoadColumn, quantity: str) -> bool:
     unit = unit_of(c.unit)
     if (unit is None and _NOT.search(c.stem)) or (unit is not None and unit.dimension != QUANTITIES[quantity][0]):
         return False
-    word = re.sub(r"[-_ ](op|rfile)$", "", c.stem)
-    word = word.removesuffix(f"_{c.unit}") if c.unit else word
+    word = c.words
     if quantity == "rpm":
         return may_be_shaft_speed(word) or unit is not None
     if c.part and c.part == _VECTOR.get(quantity):

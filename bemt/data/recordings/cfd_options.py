@@ -24,9 +24,11 @@ from bemt.data.readers.headings import counts_electrical, heading, meanings
 from bemt.data.readers.recording_toml import QUANTITIES as CHANNELS
 from bemt.data.readers.recording_toml import RecordingToml
 from bemt.data.readers.split import decimal_mark, some, split_table
-from bemt.data.readers.unit_text import TWO_MEANINGS, unit_for
+from bemt.data.readers.unit_text import BY_THE_CASE, TWO_MEANINGS, unit_for
+from bemt.data.recordings.cfd_files import home_of
 from bemt.data.recordings.cfd_loads import DUCT
 from bemt.data.recordings.channels import named
+from bemt.physics.dataset import Dataset
 
 Facts = dict[str, str | int]
 """What options say of one quantity: ``column``, ``unit``, ``sign``."""
@@ -111,7 +113,7 @@ def run_from(
     density_kg_m3: float | None = None, revolutions: int | None = None, sector: int | None = None,
     axis: str | None = None,
     zones: Sequence[str] = (), unit: Sequence[str] = (), column: Sequence[str] = (), sign: Sequence[str] = (),
-    reference: Sequence[str] = (), setup: Sequence[str] = (),
+    reference: Sequence[str] = (), setup: Sequence[str] = (), ignore: Sequence[str] = (),
 ) -> RunToml:  # fmt: skip
     """Make a run of options; all their faults at once.
 
@@ -142,7 +144,7 @@ def run_from(
             columns.setdefault(quantity, {})["sign"] = found[1]
     head = {"files": tuple(files), "rpm": rpm, "airspeed_m_s": airspeed_m_s, "density_kg_m3": density_kg_m3,
             "revolutions": revolutions, "sector": sector, "axis": axis,
-            "zones": tuple(_split(zones)) or None}  # fmt: skip
+            "zones": tuple(_split(zones)) or None, "ignore": tuple(ignore) or None}  # fmt: skip
     told = _setup(setup, faults)
     if grids := _grids(files, told, faults):
         del head["files"], told["cells"]
@@ -157,19 +159,38 @@ def run_from(
 
 
 def _grids(files: Sequence[str], told: Told, faults: list[Fault]) -> list[Mapping[str, object]]:
-    """Grids of a study, one file each: every run.toml of several, or files whose cells are listed; [] for one run."""
+    """Grids of a study: every run.toml of several, or files whose cells are listed; [] for one run.
+
+    A number for each file, or one for each grid of which there is one file of each kind, by its columns, in this order.
+    """
     cells = told.get("cells")
     if isinstance(cells, str) and "," in cells:
-        each = [number(part) for part in cells.split(",")]
+        each, own = [number(part) for part in cells.split(",")], [_home(f) for f in files]
+        at = [own[:k].count(home) for k, home in enumerate(own)]  # of files of one kind
+        if len(each) != len(files) and {own.count(home) for home in own} == {len(each)}:
+            each = [each[k] for k in at]
         if len(each) == len(files) and None not in each:
-            return [{"files": (f,), "cells": n} for f, n in zip(files, each, strict=True)]
-        got = f"cells={cells} for {len(files)} files"
-        faults.append(Fault("", "--setup", got, "one number for each file, in their order", "A folder counts as one"))
+            grids = {n: [k for k, m in enumerate(each) if m == n] for n in each}
+            if any(len({own[k] for k in of}) < len(of) for of in grids.values()):  # of several conditions
+                return [{"files": (f,), "cells": n} for f, n in zip(files, each, strict=True)]
+            return [{"files": tuple(files[k] for k in of), "cells": n} for n, of in grids.items()]
+        got, wanted = f"cells={cells} for {len(files)} files", "one number for each file, in their order"
+        hint = f"Or {len(each)} files of each kind; a folder counts as one"
+        faults.append(Fault("", "--setup", got, wanted, hint))
         told["cells"] = None
         return []
     made = [(Path(f) / "run.toml").as_posix() if (Path(f) / "run.toml").is_file() else f for f in files]
     told.setdefault("cells", None)
     return [{"files": (f,)} for f in made] if len(made) > 1 and all(_is_run(Path(f)) for f in made) else []
+
+
+def _home(file: str) -> object:
+    """What files of one kind have in common: format and columns; any other file is of its own kind."""
+    with suppress(InputError, OSError):
+        record = readers.read(file)
+        if isinstance(record, Dataset):
+            return home_of(file, record)
+    return file
 
 
 def _option(where: str) -> str:
@@ -271,6 +292,8 @@ class _Measured:
         if name not in CHANNELS and name not in self.known:
             meant = did_you_mean(name, [*CHANNELS, *self.known]).strip()
             return Fault("", "--unit", name, f"one of {some(map(repr, self.known), 12)}, or a quantity", meant)
+        if name in self.known and (unit := heading(name).unit) and unit.dimension == "none":
+            return Fault("", "--unit", f"{name}={text}", "no unit", f"Leave it out: {BY_THE_CASE}")
         quantity = name if name in CHANNELS else self.taken.get(name) or self._by_unit(name, text)
         told = None if quantity is None else _unit(quantity, text)
         if quantity is None or told is None:
@@ -345,13 +368,13 @@ def _read_as(file: str) -> dict[str, str]:
 
 def write_recording(
     file: str, out: str, unit: Iterable[str] = (), column: Iterable[str] = (), sign: Sequence[str] = (),
-    pole_pairs: int | None = None,
+    pole_pairs: int | None = None, ignore: Sequence[str] = (),
 ) -> Path:  # fmt: skip
     """Write a recording.toml beside a table of measurements, in the same folder; all faults of the options at once.
 
     `unit` ``NAME=UNIT``, of a quantity or a heading; `column` ``QUANTITY=HEADING``; `sign` ``QUANTITY=-1``;
-    `pole_pairs` of a speed that counts electrical revolutions. InputError on what is no column, unit or quantity, and
-    where `out` exists.
+    `pole_pairs` of a speed that counts electrical revolutions; `ignore` headings. InputError on what is no column, unit
+    or quantity, and where `out` exists.
     """
     import tomlkit
 
@@ -361,7 +384,7 @@ def write_recording(
         faults.append(Fault("", "--out", out, f"a file in the folder of {Path(file).name}", "Both stay together"))
     if path.exists():
         faults.append(Fault(path.as_posix(), "", "a file that exists", "a new name", "Add the lines to it by hand"))
-    document = recording_from(file, unit, column, sign, pole_pairs, faults)
+    document = recording_from(file, unit, column, sign, pole_pairs, faults, ignore)
     inline = {name: tomlkit.inline_table() for name in document["columns"]}
     for name, facts in document["columns"].items():
         inline[name].update(facts)
@@ -372,12 +395,15 @@ def write_recording(
 
 def recording_from(
     file: str, unit: Iterable[str] = (), column: Iterable[str] = (), sign: Sequence[str] = (),
-    pole_pairs: int | None = None, faults: Sequence[Fault] = (),
+    pole_pairs: int | None = None, faults: Sequence[Fault] = (), ignore: Sequence[str] = (),
 ) -> dict[str, Any]:  # fmt: skip
     """Tables of a recording.toml from what options say of a table of measurements; their faults come after `faults`."""
     faults = list(faults)
     table = split_table(load_text(file))
-    headings = _Measured([h for h in table.headings if h], {}, _read_as(file))
+    faults += [Fault("", "--ignore", repr(h), f"one of {some(map(repr, table.headings), 12)}")
+               for h in ignore if h not in table.headings]  # fmt: skip
+    read_as = {q: h for q, h in _read_as(file).items() if h not in ignore}
+    headings = _Measured([h for h in table.headings if h and h not in ignore], {}, read_as)
     loads = [q for q in ("thrust", "torque") if q in headings.read_as]
     if loads and list(sign) in (["-1"], ["1"]):  # turns all
         sign = [f"{q}={text}" for q in loads for text in sign]
@@ -389,7 +415,8 @@ def recording_from(
     for quantity, facts in columns.items():
         faults += headings.complete(quantity, facts)
     refuse(faults)
-    head = {"file": Path(file).name} | ({"decimal": ","} if decimal_mark(table) == "," else {})
+    head: dict[str, Any] = {"file": Path(file).name} | ({"decimal": ","} if decimal_mark(table) == "," else {})
+    head |= {"ignore": list(ignore)} if ignore else {}
     out = Collector(file)
     document = {"recording": head, "columns": columns} | ({"rotor": {"pole_pairs": pole_pairs}} if pole_pairs else {})
     validated(RecordingToml, document, out)

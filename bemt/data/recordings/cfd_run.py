@@ -21,10 +21,11 @@ from bemt.base.tables import number_of, number_text, text_table
 from bemt.data import readers
 from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import RunToml
-from bemt.data.readers.headings import channel_of, meanings
+from bemt.data.readers.headings import channel_of, heading, meanings
 from bemt.data.recordings.cfd_files import EXPORT, PROGRAMS, Settled, cfd_files, clock_of, read_run, settled, zone_of
 from bemt.data.recordings.cfd_loads import (
     CHANNEL,
+    COEFFICIENTS,
     NET,
     LoadColumn,
     OpenRun,
@@ -48,10 +49,9 @@ MOVING = 0.01
 """Drift over the averaged part above which a load has not settled. [1]"""
 LOST = 0.5
 """Drift above which there is no mean worth a point. [1]"""
-_COEFFICIENTS = ("CT", "CQ", "CP", "J")
 _GRIDS = frozenset(("cells", "cell_size"))
 _POINT = ("rpm", "airspeed_m_s", "density_kg_m3", "J")
-_KNOWN = frozenset((*_COEFFICIENTS, "KT", "KQ", "10KQ", "eta", "eta0", "FM", "time_s"))
+_KNOWN = frozenset((*COEFFICIENTS, "eta", "eta0", "FM", "time_s"))
 """Names of columns that say the loads once more."""
 _NAMED_LOAD = re.compile(r"force|thrust|torque|moment|lift|drag", re.IGNORECASE)
 _BESIDE = {"force.dat": "moment.dat", "moment.dat": "force.dat"}  # files that OpenFOAM writes beside each other
@@ -100,6 +100,7 @@ def _sum(parts: Sequence[tuple[float, Settled]]) -> Settled:
     )  # fmt: skip
 
 
+@np.errstate(over="ignore")  # a damaged file may hold any number
 def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> CfdRun:
     """Points of a run: rpm, thrust, torque, the duct's part, with u, and how each was averaged.
 
@@ -137,6 +138,10 @@ def _opened(run: RunToml, folder: Path, name: str) -> tuple[OpenRun, list[tuple[
     vectors = [(f, r) for f, r in read if any(n.startswith("force_") for n in r.values)]
     homes = {zone_of(Path(f), r.format) for f, r in vectors}
     columns = [c for file, record in read for c in columns_of(file, record, len(homes) > 1)]
+    ignore, known = run.run.ignore or (), dict.fromkeys(n for c in columns for n in (c.name, c.stem))
+    if not faults:
+        faults = [Fault(name, "ignore", repr(n), f"one of {', '.join(known)}") for n in ignore if n not in known]
+    columns = [c for c in columns if c.name not in ignore and c.stem not in ignore]
     notes = [n for _, r in read for n in r.notes if "restart" in n or "joined" in n or "left out" in n]
     return OpenRun(run, name, columns, complete=not faults, notes=notes, faults=faults), read
 
@@ -220,7 +225,7 @@ def _nothing(work: OpenRun) -> None:
     known = ", ".join(list(dict.fromkeys(c.name for c in work.columns))[:8]) or "none but the clock"
     if what := other_than_loads(c.name for c in work.columns):
         return work.fault(None, "", f"{what} ({known})", NO_LOAD, EXPORT)
-    first = next((c.name for c in work.columns if not c.unit), "NAME")
+    first = next((c.name for c in work.columns if not c.unit and not heading(c.words).unit), "NAME")
     hint = f'Say which it is by its unit: --unit "{first}=N" for a thrust, "{first}=N m" for a torque'
     work.fault(None, "", f"columns {known}", NO_LOAD, hint)
 
@@ -247,7 +252,7 @@ class _Points:
 
 def _operating(work: OpenRun, rpm: Array) -> dict[str, Array]:
     """Operating point, as stated or from columns, and the cells of the grids."""
-    head, values = work.run.run, {"rpm": rpm}
+    head, values = work.run.run, {"rpm": rpm} if np.isfinite(rpm).any() or work.faults else {}
     if own := work.named("cells")[:1]:
         values["cells"] = own[0].record[own[0].name]
         work.used.add(own[0].name)
@@ -300,7 +305,7 @@ def _applied(work: OpenRun, rpm: Array, loads: Mapping[str, Settled]) -> _Points
     if not {"thrust_N", "torque_Nm", "power_W", "CT", "CQ"} & values.keys():
         _nothing(work)
     elif "airspeed_m_s" not in values and "J" not in values:
-        for c in [c for c in work.columns if channel_of(c.stem) == "J" and _table(c.record)][:1]:
+        for c in [c for c in work.columns if c.coefficient[0] == "J" and _table(c.record)][:1]:
             values["J"] = c.record[c.name]
             work.used.add(c.name)
     if not work.faults:
@@ -332,20 +337,21 @@ def _unused(work: OpenRun, values: Mapping[str, Array]) -> None:
     stated = state and not _GRIDS & state.keys()
     apart = any(len(g) > 1 for g in groups(Dataset("cfd", "", state))) if stated else not state
     end = f": {len(rest[0].record)} rows, of which some differ in nothing else, are no repeats" if apart else ""
-    work.notes.insert(
-        0, f"not used, though the rows differ in it: {names}{end}; --column airspeed=NAME says what it is"
-    )
+    hint = "--column airspeed=NAME says what it is, --ignore NAME leaves it out"
+    work.notes.insert(0, f"not used, though the rows differ in it: {names}{end}; {hint}")
 
 
 def _coefficients(work: OpenRun, points: _Points) -> None:
     """Loads as coefficients, where a file has nothing else."""
     for c in work.columns:
-        if c.name in _COEFFICIENTS and c.name not in points.values:
-            found = settled(c.record[c.name], c.record, work.period, work.run.run.revolutions, work.end)
+        name, factor = c.coefficient
+        if name and name not in points.values:
+            found = settled(factor * c.record[c.name], c.record, work.period, work.run.run.revolutions, work.end)
             if isinstance(found, Settled):
-                points.values[c.name], points.averaged[c.name] = found.values, found.over
-                if c.name != "J":
-                    points.u[c.name] = np.full(found.values.size, math.hypot(np.nan_to_num(found.drift), found.scatter))
+                points.values[name], points.averaged[name] = found.values, found.over
+                work.used.add(c.name)
+                if name != "J":
+                    points.u[name] = np.full(found.values.size, math.hypot(np.nan_to_num(found.drift), found.scatter))
 
 
 def _conditions(
@@ -400,8 +406,9 @@ def _dataset(work: OpenRun, points: _Points, read: Sequence[tuple[str, Dataset]]
     return with_grid_floor(made, conditions.get("u_grid", math.nan))
 
 
-_SHOWN = {"rpm": "rev/min", "airspeed_m_s": "V [m/s]", "thrust_N": "thrust [N]", "duct_thrust_N": "of it duct [N]",
-          "torque_Nm": "torque [N m]", "power_W": "power [W]", "CT": "CT", "CQ": "CQ", "CP": "CP"}  # fmt: skip
+_SHOWN = {"rpm": "rev/min", "airspeed_m_s": "V [m/s]", "J": "J", "thrust_N": "thrust [N]",
+          "duct_thrust_N": "of it duct [N]", "torque_Nm": "torque [N m]", "power_W": "power [W]",
+          "CT": "CT", "CQ": "CQ", "CP": "CP"}  # fmt: skip
 
 
 def _with_u(x: float, u: float) -> str:

@@ -81,7 +81,7 @@ class LoadStudy(Documented):
     channel: str
     cells: tuple[float, ...]  # () where the sizes are stated
     values: tuple[float, ...]  # unit of the channel
-    u_relative: float  # Standard uncertainty on the finest grid [1]
+    u_relative: float  # Standard uncertainty on the finest grid; NaN where no value differs: the floor holds [1]
     # As in `GridStudy`, of the finest three grids
     order: float | None = None
     extrapolated: float | None = None
@@ -125,6 +125,8 @@ class LoadStudy(Documented):
         state += f", J {self.J:g}" if self.J > 0.0 else ""
         values = ", ".join(f"{v:.4g}" for v in self.values)
         lead = f"{self.name} on {on} at {state}: {values} {unit}".rstrip()
+        if math.isnan(self.u_relative):
+            return f"{lead}; {'; '.join(self.flags)}, u is that of a run without a grid study"
         end = f"u {100 * self.u_relative:.1f} %" + (f" ({'; '.join(self.flags)})" if self.flags else "")
         if self.order is None or self.gci_fine is None:
             return f"{lead}; no order: three times their spread is taken, {end}"
@@ -297,7 +299,7 @@ def by_grid(d: CfdRun, cells: Array, size_unit: str | None = None) -> CfdRun:
     rows = np.array(sorted(keep), dtype=np.intp)
     told = {**d.conditions, "grids": max((len(s.values) for s in studies), default=1)}
     told |= {"cells": float(np.nanmax(cells[rows]))} if size_unit is None else {}
-    if u_thrust := [s.u_relative for s in studies if s.channel in ("thrust_N", "CT")]:
+    if u_thrust := [s.u_relative for s in studies if s.channel in ("thrust_N", "CT") and s.u_relative >= 0.0]:
         told["u_grid"] = max(u_thrust)
     random = d.u_by.get("random", d.u)
     values, u, grid = ({k: v[rows] for k, v in table.items()} for table in (d.values, random, sizes))
@@ -326,6 +328,9 @@ def _study(d: Dataset, channel: str, order: Sequence[int], cells: Array, unit: s
     if len(fine) < 2 or any(d[channel][i] == 0.0 for i in fine[:2]):
         return None
     found = grid_study([float(d[channel][i]) for i in fine], ratios([float(cells[i]) for i in fine]))
+    if np.ptp(found.values) == 0.0:  # too few digits, or one run under several names
+        none = "the values do not differ: the convergence cannot be judged"
+        found = replace(found, order=None, u_relative=math.nan, flags=(none,))
     grids = tuple(float(cells[i]) if unit is None else _size(cells[i]) for i in order)
     more = (f"{len(order)} grids: the order is that of the finest {MOST}",) if len(order) > MOST else ()
     return LoadStudy(

@@ -227,7 +227,7 @@ class Imported:
         own = {name for run in self.runs for name in run.files}
         shown = [f for f in self.files if f.format != RUN and f.error is None]
         lines = [f.title if f.path in own else f.text + "\n" for f in shown]
-        grids = {name for run in self.runs if run.studies for name in run.files}  # told by their study
+        grids = {name for run in self.runs if run.studies for name in run.files if name != run.file}  # of its study
         lines += [cfd_run.run_text(run) + "\n" for run in self.runs if run.file not in grids]
         if self.to_do and self.files:
             steps = "\n".join(f"  ! {line}" for line in self.to_do.splitlines())

@@ -44,6 +44,7 @@ _ROWS = 6  # points on one screen
 _WIDE = 2.0  # combined standard uncertainties within which nothing is shown to differ
 _NEAR_ZERO = 0.1  # share of the largest value of a load below which a difference has no per cent
 _FAR = 1.5  # ratio of the loads beyond which a slip is likelier than physics
+_FLUIDS = {"water": 998.0, "air": 1.225, "a fluid of 1 kg/m3": 1.0}  # 1: what incompressible solvers have at first
 _NO_DENSITY = re.compile(r"density: not stated")
 _NAMES = {"program": "", "cells": "cells", "grid_level": "grid", "turbulence": "", "solver": "", "domain": "domain"}
 
@@ -122,7 +123,8 @@ def cfd_points(path: str, read: Dataset | None = None) -> tuple[Dataset, Dataset
         return imported, imported
     points = named(as_dataset(imported))
     known = points.values.keys() & {"thrust_N", "torque_Nm", "CT", "CQ", "CP"}
-    if not known or ("rpm" not in points and "thrust_N" in points):
+    needed = "thrust_N" in points or ("J" not in points and "airspeed_m_s" in points)
+    if not known or ("rpm" not in points and needed):
         got = f"channels {', '.join(list(imported.values)[:8])}"
         raise InputError(Fault(path, "", got, "a speed and a load", "`bemt import` shows how each column was read"))
     if conditions_of(imported):
@@ -197,7 +199,8 @@ def compare_run(
         out, tuple(faults_first(lines)), known, dict(imported.averaged) if is_run(imported) else {},
         tuple(dict.fromkeys(notes)),
         _sentence(out, "CFD" if computed else "Recording", open_units(imported),
-                  imported.elsewhere if is_run(imported) else (), "density_kg_m3" not in points_stated),
+                  imported.elsewhere if is_run(imported) else (),
+                  "density_kg_m3" not in points_stated and not points_stated.isdisjoint(_KIND)),
         _next(out, lines, name, asked, whole.moved),
     )  # fmt: skip
 
@@ -245,6 +248,26 @@ def _verdict(E: float, u: float) -> str:
     return "agrees" if abs(E) <= u else "within 2 u" if abs(E) <= _WIDE * u else "differs"
 
 
+def _fluid(loads: Sequence[BothLoads], density: float) -> str:
+    """What all loads look like if the run is of another density than was taken; "" where none brings all of them near.
+
+    Nearer by half or more, and within twice both bands.
+    """
+    said = [load for load in loads if load.cfd and load.bemt and math.isfinite(load.u_both)]
+    for words, other in _FLUIDS.items():
+        far = math.log(other / density)
+        off = np.array([math.log(max(load.cfd / load.bemt, 1e-9)) for load in said])
+        wide = np.array([_share(load) for load in said])
+        if said and np.all(np.abs(off - far) < np.minimum(0.5 * np.abs(off), _WIDE * wide)):
+            return f" All loads are about {math.exp(far):.3g} times BEMT's, as in {words}: first check the density."
+    return ""
+
+
+def _share(load: BothLoads) -> float:
+    """Both bands over the loads, [1]."""
+    return math.hypot(np.nan_to_num(load.u_cfd, posinf=0.0) / load.cfd, load.u_bemt / load.bemt, 0.02)
+
+
 def _slip(name: str, loads: Sequence[BothLoads], unit_open: bool, density_open: bool = False) -> tuple[float, str]:
     """What a difference looks like that is no physics, and how little it fits; "" when nothing is near."""
     said = [load for load in loads if load.cfd and load.bemt and math.isfinite(load.u_both)]
@@ -255,9 +278,7 @@ def _slip(name: str, loads: Sequence[BothLoads], unit_open: bool, density_open: 
     off = np.array([load.cfd / load.bemt for load in said])
     if name not in _KIND or np.any(off <= 0.0) or 1.0 / _FAR < float(np.median(off)) < _FAR:
         return math.inf, ""
-    wide = np.array(
-        [math.hypot(np.nan_to_num(load.u_cfd, posinf=0.0) / load.cfd, load.u_bemt / load.bemt, 0.02) for load in said]
-    )
+    wide = np.array([_share(load) for load in said])
     # no rotor of the case is off by FACTOR: then even a unit that is stated may be wrong
     may = (e for e in unit_errors.errors(_KIND[name]) if unit_open or max(e.factor, e.repair) > FACTOR)
     near = [(e.rarity + float(np.mean(far**2)), e) for e in may
@@ -300,6 +321,7 @@ def _sentence(
     every = [(k, load) for p in points for k, load in p.loads.items()]
     off = [(k, load) for k, load in every if load.verdict == "differs"]
     near = [(k, load) for k, load in every if load.verdict == "within 2 u"]
+    fluid = _fluid([load for k, load in every if k in _KIND], points[0].density_kg_m3) if density_open else ""
     lost = sum(load.verdict == "no result" for _, load in every)
     tail = f" No result for {number_of(lost, 'value')}." if lost else ""
     top = {k: max(abs(load.cfd) for name, load in every if name == k) for k, _ in every}
@@ -309,6 +331,8 @@ def _sentence(
         loads = {name: [v for n, v in every if n == name] for name, _ in off}
         if left := [words for name, own in loads.items() if (words := _not_counted(name, own, elsewhere))]:
             tail += "".join(left)
+        elif fluid:
+            tail += fluid
         else:
             slips = [_slip(name, own, name in units_open, density_open) for name, own in loads.items()]
             said = [slip for slip in slips if slip[1]]  # a unit explains all that differs, or nothing
@@ -326,9 +350,9 @@ def _sentence(
         sizes = " and ".join(f"{100.0 * load.difference / top[k]:+.0f} % {of} {_LOADS[k].split(' [')[0].lower()}"
                              for k, load in worst.items())  # fmt: skip
         if of == "in":
-            return f"BEMT is off by {sizes}; both bands are too wide to call that a difference.{tail}"
+            return f"BEMT is off by {sizes}; both bands are too wide to call that a difference.{fluid}{tail}"
         rest = f"the others are within twice both bands, off by up to {sizes}"
-        return f"{who} and BEMT agree in {agree} of {len(every)} values; {rest}.{tail}"
+        return f"{who} and BEMT agree in {agree} of {len(every)} values; {rest}.{fluid}{tail}"
     if lost == len(every):
         return f"No value of {who} and BEMT can be compared.{tail}"
     return f"{who} and BEMT agree within both bands.{tail}"

@@ -99,8 +99,9 @@ class AlongBlade:
         elif self.beyond:
             rows.append("  No single effect explains it.")
         else:
-            limits = "thrust by {:.0%} and torque by {:.0%}".format(*self.fine)
-            rows.append(f"  Nothing to explain: the recording's own uncertainty is {limits}.")
+            said = zip(("thrust", "torque"), self.fine, strict=True)
+            known = (f"{k} {u:.0%} ({'its u in recording.csv' if u > FINE else 'grids of such CFD'})" for k, u in said)
+            rows.append(f"  Nothing to explain within {' and '.join(known)}.")
         return "\n".join(rows)
 
     def document(self) -> Mapping[str, object]:
@@ -195,7 +196,7 @@ def _condition(
     if n.size and speed is None and not one:
         got = f"slices without a speed, and {n.size} readings at {n.min():g} to {n.max():g} rev/min"
         got += f", {v.min():g} to {v.max():g} m/s"
-        raise InputError(Fault(path.as_posix(), "rpm", got, "the speed of the slices", "A column rpm, or --rpm N"))
+        raise InputError(Fault(path.as_posix(), "rpm", got, "the speed of the slices", "A column rpm in their table"))
     if not one:
         speed, whose = (case.rpm, "of the case") if speed is None else (speed, whose)
         return SliceCondition(speed, case.airspeed_m_s if wind is None else wind, loads.density, whose)

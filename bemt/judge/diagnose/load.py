@@ -16,7 +16,6 @@ import numpy as np
 from bemt.base.errors import Fault, InputError, gathered, refuse
 from bemt.base.packed import part_of
 from bemt.base.units import ZERO_CELSIUS
-from bemt.data.readers.headings import surely_shaft_speed
 from bemt.data.recordings.channels import file_name, named, stated
 from bemt.data.recordings.check import check
 from bemt.judge.compare.selection import one_rotor, speed_in_doubt, wind_of
@@ -69,7 +68,7 @@ def load(
     """Read one recording, whatever its format."""
     from bemt.data.recordings.cfd_run import is_run, run_at
     from bemt.data.recordings.cfd_setup import one_grid
-    from bemt.data.recordings.load import import_file
+    from bemt.data.recordings.load import filled, import_file
     from bemt.data.recordings.reduce import reduce, reduction
 
     if imported is None:
@@ -81,7 +80,7 @@ def load(
         run, gains = one_grid(imported)
         made = records.from_series(run, case, gains)
         return replace(made, notes=(*made.notes, *imported.notes), computed=True)
-    imported = _filled(imported, rpm, airspeed_m_s)
+    imported = filled(imported, rpm, airspeed_m_s)
     speed_in_doubt(imported, path)
     _speed_missing(imported, path)
     _airspeed_in_doubt(imported, case, path)
@@ -143,30 +142,6 @@ def _airspeed_in_doubt(imported: Dataset, case: Case, path: str) -> None:
         got = f"thrust that is negative below {zero:.0f} rev/min, as in wind, and no airspeed"
         hint = "State it: --airspeed-m-s V (compare: --air-a or --air-b); in still air, where the cell's zero is off: 0"
         raise InputError(Fault(path, "airspeed_m_s", got, "the airspeed", hint))
-
-
-def _filled(imported: Dataset, rpm: float | None, airspeed_m_s: float | None) -> Dataset:
-    """Recording with the speed and the airspeed that the user states where it has no column of them."""
-    known = named(imported).values
-    told, notes = {}, []
-    if rpm is not None and "rpm" not in known:
-        for name, v in imported.values.items():
-            varies = not imported.unit(name) and np.unique(v[np.isfinite(v)]).size > 1
-            heading = imported.headings.get(name) or name
-            if varies and surely_shaft_speed(heading):
-                got = f"--rpm {rpm:g}, and a column of {np.unique(v).size} speeds without a unit"
-                hint = f"Head it {heading} (rev/min) or {heading} (rad/s), and leave out --rpm"
-                raise InputError(Fault(imported.file, heading, got, "one source of the speed", hint))
-    for name, value, same in (("rpm", rpm, ("rpm",)), ("airspeed_m_s", airspeed_m_s, ("airspeed_m_s", "J"))):
-        if value is None:
-            continue
-        own = next((k for k in same if k in known), None)
-        if own is None:
-            told[name] = np.full(len(imported), float(value))
-        notes.append(f"{name}: {value:g} as given" if own is None else f"{name}: ignored, the file has {own}")
-    values = {**imported.values, **told}
-    units = {k: unit for k, unit in imported.units.items() if k not in told}
-    return replace(imported, values=values, units=units, notes=(*imported.notes, *notes)) if notes else imported
 
 
 def _step_responses(imported: Dataset, rows: Dataset, points: Dataset) -> bool:

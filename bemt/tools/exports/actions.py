@@ -33,7 +33,7 @@ def export(
     sideslip_deg: float | None = None, level: float | None = None, domain: Literal["free", "pipe"] | None = None,
     sector: Literal["half", "blade", "full"] | None = None,
     turbulence: Literal["kOmegaSST", "realizableKE"] | None = None,
-    solver: Literal["compressible", "incompressible"] | None = None,
+    solver: Literal["compressible", "incompressible"] | None = None, far_field_over_D: float | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Exported:  # fmt: skip
     """Write a case for CAD, CFD, simulators and design tools.
@@ -93,6 +93,9 @@ def export(
         Openfoam: turbulence model; kOmegaSST by default.
     solver : {"compressible", "incompressible"}, optional
         Openfoam: rhoSimpleFoam (by default above a tip Mach number of 0.5) or simpleFoam.
+    far_field_over_D : float, optional
+        Flow: width of the box of air over the diameter, 10 by default; half of it is ahead of the rotor, all of it
+        behind.
     progress : callable, optional
         Called with one line per target while it is written.
 
@@ -127,7 +130,8 @@ def export(
     from bemt.tools.exports.printing import Print, asked
 
     wanted = [word.lower() for word in ([format] if isinstance(format, str) else format)]
-    numbers = {"rpm": rpm, "airspeed_m_s": airspeed_m_s, "sideslip_deg": sideslip_deg, "level": level}
+    numbers = {"rpm": rpm, "airspeed_m_s": airspeed_m_s, "sideslip_deg": sideslip_deg, "level": level,
+               "far_field_over_D": far_field_over_D}  # fmt: skip
     given: dict[str, Any] = {k: None if v is None else number(k, v, finite=False) for k, v in numbers.items()}
     given |= {"domain": domain, "sector": sector, "turbulence": turbulence, "solver": solver}
     request = Print(

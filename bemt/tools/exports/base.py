@@ -437,7 +437,7 @@ class SolidExport(Export):
         try:
             for s in job.shapes:
                 made = export(s.rotor, s.duct, out, [self.id], name=job.case.name + s.end, unit=job.unit,
-                              options=s.options, model=s.model)  # fmt: skip
+                              options=s.options, model=s.model, box=job.own.get("far_field_over_D"))  # fmt: skip
                 told = {} if s.printed is None else {"printed": s.printed.document()}
                 found = joined(found, made | {"name": job.case.name} | told)
         except GeometryError as error:

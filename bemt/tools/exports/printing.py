@@ -10,6 +10,7 @@ import numpy as np
 
 from bemt.base.document import Documented
 from bemt.base.errors import Fault
+from bemt.base.toml import Table, entry
 from bemt.rotors.case import Case
 from bemt.tools.exports.base import SolidExport
 from geometry.common import GeometryError
@@ -249,12 +250,20 @@ class ThreeMfExport(SolidExport):
     source = "geometry.export"
 
 
+class FlowTable(Table):
+    """What may be asked of the air around a rotor."""
+
+    far_field_over_D: float | None = entry("width of the box over the diameter of the rotor", "", 3, 200)
+
+
 class FlowExport(SolidExport):
     """A box less rotor, duct and vanes; boundaries are picked by name."""
 
     id = "flow"
     title = "STEP of the air around, boundaries named"
     source = "geometry.cad.flow_domain; read by gmsh with Geometry.OCCImportLabels"
+    options = FlowTable
+    uses = frozenset(FlowTable.named())
 
 
 class ZoneExport(SolidExport):
