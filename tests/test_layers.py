@@ -87,7 +87,6 @@ MAY: dict[str, set[str]] = {
     "bemt.judge.diagnose.figures|bemt.judge.diagnose.folder|bemt.judge.diagnose.rotor_calibration": {"files"},
     "bemt.judge.diagnose.fit": {"files"},
     "bemt.judge.proof.prove": {"files", "clock", "environment"},
-    "bemt.judge.proof.follow": {"files"},
     "bemt.judge.proof.loop": {"files"},
     "bemt.judge.proof.real": {"files"},
     "bemt.judge.proof.rows": {"files"},

@@ -15,7 +15,8 @@ import pytest
 
 from bemt.base.errors import InputError
 from bemt.data.recordings.load import import_file
-from bemt.judge.proof import causes, follow, items, loop, prove, real, rows, score, truth, truth_section, truth_world
+from bemt.judge.proof import causes, items, loop, prove, real, rows, score, truth, truth_section, truth_world
+from bemt.judge.proof import course as courses
 from bemt.judge.proof.items import Bench, Item
 from bemt.judge.proof.rows import Entry, Estimate, Key, Ranked, Step, ToldAnswer
 from bemt.judge.proof.stand import StandErrors, covariance, full_scales, record
@@ -548,7 +549,7 @@ def weighed(patched: Any) -> tuple[items.Bench, Item]:
 def _followed(
     weighed: tuple[items.Bench, Item], monkeypatch: pytest.MonkeyPatch, out: Path, answers: list[ToldAnswer],
     runs: int = 3,
-) -> tuple[follow.Course, list[list[str]], list[dict[str, str]]]:  # fmt: skip
+) -> tuple[courses.Course, list[list[str]], list[dict[str, str]]]:  # fmt: skip
     """Course of the item whose answers are given, with the commands and the files that were seen."""
     bench, made = weighed
     for home, more in (("items", {}), (prove.ASKED, {"reference.csv": made.reference})):
@@ -606,7 +607,7 @@ def test_mending_takes_the_cause_away_and_a_wrong_name_nothing(
         before, after = (files["recording.csv"] for files in seen)
         assert before != after
         ratio[name] = _median(before, "thrust_N") / _median(after, "thrust_N")
-        found[name] = follow.judge(there, course, 3)
+        found[name] = courses.judge(there, course, 3)
     assert abs(ratio["thrust_gain"] - 1.0) > 0.05
     assert ratio["torque_gain"] == pytest.approx(1.0, abs=0.02)
     assert found["thrust_gain"][1] and found["thrust_gain"][0].right
@@ -622,7 +623,7 @@ def test_a_pair_is_found_one_after_the_other_and_a_model_is_no_run(
     course, asked, _ = _followed(weighed, monkeypatch, tmp_path, said, runs=1)
     assert course.steps == ["model", "reference"] and course.end == "used up"
     assert asked[0][asked[0].index("--case") + 1] != "case.toml"
-    assert [follow.judge(there, course, k)[1] for k in (0, 1)] == [False, True]
+    assert [courses.judge(there, course, k)[1] for k in (0, 1)] == [False, True]
 
 
 def test_what_is_named_again_goes_into_the_case_once_more_and_the_search_goes_on(
@@ -633,7 +634,7 @@ def test_what_is_named_again_goes_into_the_case_once_more_and_the_search_goes_on
     course, asked, _ = _followed(weighed, monkeypatch, tmp_path, said)
     assert course.steps == ["model", "model", "mend"] and course.end == "none"
     assert len({words[words.index("--case") + 1] for words in asked[:2]}) == 2, "a case of its own each time"
-    assert follow.judge(entry("pair", "untwist", "thrust_gain"), course, 1)[1], "what was named before stays"
+    assert courses.judge(entry("pair", "untwist", "thrust_gain"), course, 1)[1], "what was named before stays"
     over = [answer("named", "untwist")] * 4
     course, asked, _ = _followed(weighed, monkeypatch, tmp_path / "over", over)
     assert course.steps == ["model", "model"] and course.end == "named again"
@@ -642,12 +643,12 @@ def test_what_is_named_again_goes_into_the_case_once_more_and_the_search_goes_on
 def test_what_is_claimed_after_the_last_cause_is_wrong_and_forgets_nothing() -> None:
     there = entry("sensor", "thrust_gain")
     said = [answer("sensor", "thrust_gain"), answer("class", "duct", "nacelle")]
-    course = follow.Course("0000", said, ["mend"], [15.0], [["thrust_gain"]], "used up")
-    judged, exact = follow.judge(there, course, 1)
+    course = courses.Course("0000", said, ["mend"], [15.0], [["thrust_gain"]], "used up")
+    judged, exact = courses.judge(there, course, 1)
     assert exact and judged.claims and not judged.right
     wrong = replace(course, answers=[*said[:1], answer("named", "duct")])
-    assert follow.judge(there, wrong, 1)[1] is False
-    nothing = follow.judge(entry("null"), replace(course, answers=[said[0], answer("none")]), 1)[0]
+    assert courses.judge(there, wrong, 1)[1] is False
+    nothing = courses.judge(entry("null"), replace(course, answers=[said[0], answer("none")]), 1)[0]
     assert nothing.claims and not nothing.right
 
 

@@ -10,9 +10,9 @@ import pytest
 from bemt.data.recordings.load import import_file
 from bemt.judge.compare.drive_laws import LAWS
 from bemt.judge.diagnose.contrast import compare
-from bemt.judge.proof import follow, prove, score
+from bemt.judge.proof import prove, score
 from bemt.judge.proof.items import Item
-from bemt.judge.proof.real import draw_pairs, followed, pairs
+from bemt.judge.proof.real import draw_pairs, pairs
 from bemt.physics.effects import catalogue
 from bemt.rotors.case import load_case
 
@@ -66,18 +66,3 @@ def test_runs_of_one_stand_that_nobody_touched_agree(drawn: list[Item], tmp_path
         said.append(compare(folder / "reference.csv", folder / "recording.csv").verdict)
     assert not {"named", "sensor", "class"} & set(said)
     assert said.count("none") >= 0.8 * len(said)
-
-
-def test_a_followed_step_belongs_to_a_pair_and_undoes_its_cause(tmp_path: Path) -> None:
-    known = {(p.a, p.b) for p in pairs()}
-    assert followed() and all(way.of in known and way.step and way.ab != way.of for way in followed())
-    (tmp_path / "recording.csv").write_text(
-        "rpm,thrust_N,torque_Nm\n1000,1.0,0.1\n2000,4.0,0.4\n3000,9.0,0.9\n", "utf-8"
-    )
-    for name in ("case.toml", "stations.csv"):
-        (tmp_path / name).write_text("", "utf-8")
-    files = follow.with_reference(tmp_path, {"thrust_N": 2.0})
-    test, known_rows = (files[name].splitlines() for name in ("recording.csv", "reference.csv"))
-    assert [row.split(",")[0] for row in test[1:]] == ["2000"]
-    assert [float(row.split(",")[1]) for row in known_rows[1:]] == [2.0, 18.0]
-    assert [float(row.split(",")[2]) for row in known_rows[1:]] == [0.1, 0.9]

@@ -313,7 +313,7 @@ def calibrate_rotor(
 @action("Models and checks", "prove --seed 1")
 def prove(
     *, size: Literal["small", "full", "stand", "ccblade", "real"] = "small", seed: int | None = None,
-    jobs: Count | None = None, follow: bool = False, loop: Count | None = None, fixed: bool = False,
+    jobs: Count | None = None, loop: Count | None = None, fixed: bool = False,
     wired: bool = False, calibrate_intervals: Sequence[Path] = (), out: Path | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Told:  # fmt: skip
@@ -327,8 +327,6 @@ def prove(
         Random seed; from the operating system by default.
     jobs : int, optional
         Parallel diagnoses; one per core by default.
-    follow : bool
-        With published recordings and a folder: also take the steps that open answers recommend, if the data allow.
     loop : int, optional
         Then take the runs that open answers recommend, up to so many each, on the hidden stand.
     fixed : bool
@@ -350,28 +348,26 @@ def prove(
     Raises
     ------
     InputError
-        For a follow-up without a folder.
+        For a loop without a folder.
 
     Examples
     --------
-    >>> prove(follow=True)
+    >>> prove(loop=3)
     Traceback (most recent call last):
         ...
-    bemt.base.errors.InputError: follow: got size small without out; expected size real and out.
+    bemt.base.errors.InputError: loop: got size small without out; expected generated items and out.
     """
     import os
     from pathlib import Path as File
 
     from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
     from bemt.base.plugins import load, missing, offered
-    from bemt.judge.proof import follow as following
     from bemt.judge.proof import intervals, score
     from bemt.judge.proof import loop as looping
     from bemt.judge.proof.prove import prove as run
 
     got, hands = f"size {size}" + ("" if out else " without out"), offered("HANDS").get("wired") if wired else None
     for wrong, option, told, expected, *hint in (
-        (follow and not (out and size == "real"), "--follow", got, "size real and out"),
         (loop and not (out and size != "real"), "--loop", got, "generated items and out"),
         ((seed or 0) < 0, "--seed", f"{seed}", "a whole number of 0 or more"),
         (wired and not (loop and size == "stand"), "--wired", got, "size stand and a loop"),
@@ -383,8 +379,8 @@ def prove(
         return Told({"schema": "bemt.intervals/1"}, intervals.rewrite([File(p) for p in calibrate_intervals], out))
     say, cores = progress or (lambda line: None), jobs or os.cpu_count() or 1
     found = run(None if out is None else os.fspath(out), size, seed, jobs, say, lambda line: say(f"{line}\n"))
-    taken = [following.text(following.follow(File(out or "."), cores, say))] if follow else []
+    told = [score.text(found)]
     if loop:
-        taken.append(looping.loop(File(out or "."), loop, cores, fixed, say, load(hands) if hands else None).text)
+        told.append(looping.loop(File(out or "."), loop, cores, fixed, say, load(hands) if hands else None).text)
     code = EXIT_OK if all(row.met is not False for row in found.score) else EXIT_UNCONVERGED
-    return Told(found.document(), "\n\n".join([score.text(found), *taken]), exit_code=code)
+    return Told(found.document(), "\n\n".join(told), exit_code=code)

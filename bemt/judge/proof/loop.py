@@ -32,7 +32,7 @@ from bemt.base.tables import json_text, write_atomic
 from bemt.judge.diagnose.suggest import minutes
 from bemt.judge.proof import prove, rows, score
 from bemt.judge.proof.causes import CAUSES, Rig
-from bemt.judge.proof.follow import DONE, MODEL, Course, Loop, scored
+from bemt.judge.proof.course import DONE, MODEL, Course, Loop, scored
 from bemt.judge.proof.items import Bench, further_run, recorded_again
 from bemt.judge.proof.rows import Entry, Step, ToldAnswer
 from bemt.physics import effects

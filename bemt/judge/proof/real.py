@@ -85,22 +85,6 @@ def pairs() -> tuple[PairOf, ...]:
     return tuple(out)
 
 
-@dataclass(frozen=True)
-class Followed:
-    """A silent pair, the step that was recommended, and the recordings that took it."""
-
-    of: tuple[str, str]
-    step: str
-    ab: tuple[str, str]
-
-
-def followed() -> tuple[Followed, ...]:
-    """Steps of the manifest that somebody took."""
-    return tuple(
-        Followed((r["of"][0], r["of"][1]), r["step"], (r["ab"][0], r["ab"][1])) for r in _manifest()["followed"]
-    )
-
-
 def pair_files(a: str, b: str) -> dict[str, str] | None:
     """Files of an item that compares two recordings; None where one of them is not found."""
     places = ((name, root / _recordings()[name]["path"]) for name in (a, b) for root in reversed(data_roots()))

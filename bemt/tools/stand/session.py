@@ -23,7 +23,7 @@ from bemt.judge.actions import plan
 from bemt.judge.diagnose.folder import beside
 from bemt.judge.diagnose.suggest import minutes
 from bemt.judge.proof import prove
-from bemt.judge.proof.follow import Course
+from bemt.judge.proof.course import Course
 from bemt.judge.proof.loop import A_RUN, Points, follow
 from bemt.physics import effects
 from bemt.rotors.case import load_case
