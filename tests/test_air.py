@@ -98,12 +98,6 @@ def test_humidity_lightens_air_and_speeds_sound(p, t, h):
     assert wet.a_sound > moist.a_sound >= dry.a_sound
 
 
-def test_humidity_matters_at_the_size_expected():
-    dry, wet = Air.from_state(101325.0, 30.0, 0.0), Air.from_state(101325.0, 30.0, 100.0)
-    x = saturation_pressure(303.15) / 101325.0
-    assert 1 - wet.rho / dry.rho == pytest.approx(0.378 * x, rel=0.02)
-
-
 def test_all_faults_of_a_reading_at_once():
     with pytest.raises(InputError) as error:
         Air.from_state(1013.25, 293.15, 150.0)

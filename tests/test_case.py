@@ -9,7 +9,12 @@ import numpy as np
 import pytest
 
 from bemt.base.errors import Fault, InputError
+from bemt.physics import bem
 from bemt.rotors.case import Case, find_cases, load_case
+from bemt.rotors.case.prepare import prepare_case
+from geometry.airfoil import naca
+from geometry.laws import helix
+from geometry.rotor import Rotor
 
 MALFORMED = Path(__file__).parent / "malformed"
 CASES = Path(__file__).resolve().parents[1] / "cases"
@@ -254,6 +259,16 @@ def test_hash_follows_every_file_and_no_path(tmp_path: Path) -> None:
     good = (MALFORMED / "stations_good.csv").read_text()
     one, same, other = make("a", good), make("b", good), make("c", good.replace("0.18", "0.19"))
     assert one.content_hash() == same.content_hash() != other.content_hash()
+
+
+def test_a_script_gives_the_thrust_of_the_case(tmp_path: Path) -> None:
+    """The example of the README and a case of the same propeller: one section table, the rule's."""
+    case = load_case(write(tmp_path, GOOD))
+    found = bem.solve(Rotor(helix(0.254, 0.127, anchors=naca("4412")), B=2), rpm=6000.0, air=case.air())
+    wanted = prepare_case(case).solve(6000.0, 0.0, case.air())
+    assert found.kind == wanted.kind == "bemt" and found.values.keys() == wanted.values.keys()
+    for channel in ("thrust_N", "torque_Nm", "CT", "Re75"):
+        assert found[channel] == pytest.approx(wanted[channel], rel=1e-9)
 
 
 @pytest.mark.parametrize(

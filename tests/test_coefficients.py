@@ -39,13 +39,6 @@ def test_helicopter_convention_from_first_principles(T, rho, n, D):
     assert co.CQ_PER_ROTOR * CQ_rotor == pytest.approx(co.CQ_from_CP(co.CP(P, rho, n, D)), rel=1e-12)
 
 
-def test_factors_between_the_conventions():
-    assert co.CT_PER_ROTOR == math.pi**3 / 4
-    assert co.CP_PER_ROTOR == math.pi**4 / 4
-    assert co.CT_PER_ROTOR == pytest.approx(7.7516, abs=1e-4)
-    assert co.CP_PER_ROTOR == pytest.approx(24.3523, abs=1e-4)
-
-
 @given(positive, positive, st.floats(0.05, 3))
 def test_ideal_rotor_has_a_figure_of_merit_of_one(rho, T, D):
     A, n = math.pi * D**2 / 4, 50.0
@@ -53,13 +46,7 @@ def test_ideal_rotor_has_a_figure_of_merit_of_one(rho, T, D):
     assert co.FM(co.CT(T, rho, n, D), co.CP(P, rho, n, D)) == pytest.approx(1.0, rel=1e-10)
 
 
-@given(st.floats(0, 1), st.floats(1e-4, 1))
-def test_figure_of_merit_does_not_depend_on_the_convention(CT, CP):
-    CT_rotor, CP_rotor = co.to_rotor(CT, CP)
-    assert co.FM(CT, CP) == pytest.approx(CT_rotor**1.5 / math.sqrt(2) / CP_rotor, rel=1e-10)
-
-
-@given(st.floats(1e-3, 3), signed, positive)
+@given(st.floats(1e-8, 3), signed, positive)
 def test_efficiency_is_useful_over_shaft_power(J, CT, CP):
     assert co.eta(J, CT, CP) == pytest.approx(J * CT / CP, rel=1e-12)
 
@@ -72,11 +59,6 @@ def test_efficiency_in_the_four_states():
     assert math.isnan(co.eta(0.8, 0.05, 0.0))
     assert math.isnan(co.eta(0.0, math.nan, 0.04))  # an unconverged point is not 0
     assert math.isnan(co.eta(math.nan, 0.1, 0.04))
-
-
-@given(st.floats(1e-8, 1e-3))
-def test_efficiency_is_continuous_at_rest(J):
-    assert co.eta(J, 0.1, 0.04) == pytest.approx(2.5 * J, rel=1e-12)
 
 
 @pytest.mark.parametrize(("CT", "CP"), [(-0.01, 0.04), (0.1, 0.0), (0.1, -0.02), (math.nan, 0.04)])

@@ -356,21 +356,32 @@ def test_a_mistyped_kernel_number_is_refused() -> None:
 NEW = '''
 from dataclasses import dataclass
 
-from bemt.physics.effects.base import RotorBuild, Effect, Parameter
+from bemt.physics.effects.base import Effect, Parameter, RotorBuild
 
 
 @dataclass(frozen=True)
 class {cls}(Effect):
-    """Made up for a test."""
+    """Made up for a test.
+
+    Notes
+    -----
+    Declared here.
+    """
 
     factor: float = 1.25
+    form: str = "round"
 
     id = "{id}"
-    title = "made up"
-    parameters = (Parameter("factor", "1", 1.0, 1.5, "made up"),)
+    title = "made up for a test"
+    sign = "nobody has ever seen it"
+    parameters = (Parameter("factor", "furlong", 1.0, 1.5, "nobody"),)
 
     def section(self, bake: RotorBuild) -> None:
+        """More drag."""
         bake.cd *= self.factor
+
+    def variants(self):
+        return ({{"form": "round"}}, {{"form": "square"}})
 '''
 
 
@@ -386,13 +397,19 @@ def extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
         sys.modules.pop(f"bemt.physics.effects.{path.stem}", None)
 
 
-def test_a_new_effect_is_one_new_file(extra: Path) -> None:
+def test_a_new_effect_is_one_new_file_that_every_list_shows(extra: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (extra / "made_up.py").write_text(NEW.format(cls="MadeUp", id="made_up"))
     assert set(effects.catalogue()) == {*CATALOGUE, "made_up"}
     assert "made_up" in [e.id for e in effects.standard()]
     label = "static, cruise, transonic"
     off, on = readings(label, rest("made_up")), readings(label, effects.standard())
     assert np.all(on[1] > off[1])
+    page = effects_page.page()
+    assert "### made_up" in page and "* `factor` 1.25 (1 to 1.5 furlong: nobody" in " ".join(page.split())
+    assert "* `form` `round`, `square`" in page
+    assert "made up for a test" in printed(capsys)
+    (ours,) = [e for e in effects_list.document()["effects"] if e["id"] == "made_up"]
+    assert ours["choices"] == {"form": ["round", "square"]} and ours["kind"] == "air"
 
 
 def test_several_effects_of_one_file(extra: Path) -> None:
@@ -401,18 +418,13 @@ def test_several_effects_of_one_file(extra: Path) -> None:
         + "\n".join(f"class {n.title()}(Common):\n    id = {n!r}\n" for n in ("this", "that"))
     )
     assert set(effects.catalogue()) == {*CATALOGUE, "this", "that"}
-    assert vars(effects.from_text("this(factor=1.5)")) == {"factor": 1.5}
+    assert vars(effects.from_text("this(factor=1.5)")) == {"factor": 1.5, "form": "round"}
 
 
 def test_an_effect_without_id_is_refused(extra: Path) -> None:
     (extra / "nameless.py").write_text(NEW.format(cls="Nameless", id=""))
     with pytest.raises(ValueError, match="Nameless: id '' is empty"):
         effects.catalogue()
-
-
-def test_the_catalogue_forgets_the_new_effect() -> None:
-    found, known = ({i: c.__module__ for i, c in some.items()} for some in (effects.catalogue(), CATALOGUE))
-    assert found == known
 
 
 def test_two_effects_of_one_id_are_refused(extra: Path) -> None:
@@ -422,51 +434,6 @@ def test_two_effects_of_one_id_are_refused(extra: Path) -> None:
 
 
 # The promise of ``bemt effects``: the catalogue and nothing else, in every form it is printed.
-
-
-DECLARED = '''
-from dataclasses import dataclass
-
-from bemt.physics.effects.base import Effect, Flow, Parameter, Reading
-
-
-@dataclass(frozen=True)
-class MadeUp(Effect):
-    """Made up for a test.
-
-    Notes
-    -----
-    Declared here.
-    """
-
-    size: float = 0.5
-    form: str = "round"
-
-    id = "made_up"
-    title = "made up for a test"
-    sign = "nobody has ever seen it"
-    kind = "drive"
-    parameters = (Parameter("size", "furlong", 0.25, 0.75, "nobody"),)
-    on_by_default = False
-
-    def reading(self, reading: Reading, flow: Flow) -> None:
-        """Nothing."""
-
-    def variants(self):
-        return ({"form": "round"}, {"form": "square"})
-'''
-
-
-@pytest.fixture
-def made_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """One more file in the package, and no other edit."""
-    (tmp_path / "made_up.py").write_text(DECLARED)
-    monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(tmp_path)])
-    effects.catalogue.cache_clear()
-    yield
-    monkeypatch.undo()
-    effects.catalogue.cache_clear()
-    sys.modules.pop("bemt.physics.effects.made_up", None)
 
 
 def printed(capsys: pytest.CaptureFixture[str], *options: str) -> str:
@@ -497,17 +464,3 @@ def test_every_effect_is_in_every_form(capsys: pytest.CaptureFixture[str]) -> No
         flat = " ".join(page.split())
         assert all(f"* `{p.name}` " in page and " ".join(p.source.split()) in flat for p in cls.parameters)
         assert by_id[name]["source"], "no Notes"
-
-
-@pytest.mark.usefixtures("made_up")
-def test_a_new_file_is_listed_without_another_edit(capsys: pytest.CaptureFixture[str]) -> None:
-    page = effects_page.page()
-    assert "### made_up" in page and "* `size` 0.5 (0.25 to 0.75 furlong: nobody" in " ".join(page.split())
-    assert "* `form` `round`, `square`" in page
-    assert "made up for a test" in printed(capsys)
-    (ours,) = [e for e in effects_list.document()["effects"] if e["id"] == "made_up"]
-    assert ours["choices"] == {"form": ["round", "square"]} and ours["kind"] == "drive"
-
-
-def test_the_new_file_leaves_no_trace() -> None:
-    assert "made_up" not in effects.catalogue()

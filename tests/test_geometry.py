@@ -42,10 +42,6 @@ def stations() -> Blade:
     )  # fmt: skip
 
 
-def test_every_pitch_law_is_covered_here() -> None:
-    assert set(PITCH) == set(PITCH_LAWS)
-
-
 # elements ------------------------------------------------------------------------------------------------------------
 
 

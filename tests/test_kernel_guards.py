@@ -38,12 +38,12 @@ def lookup(alpha: float, lre0: float, W2: float, base: int, tab: Any, g: Any) ->
 
 
 @pytest.mark.parametrize("element", ["open_rotor", "ducted_rotor"])
-@pytest.mark.parametrize("far", [0.0, 1.0])
+@pytest.mark.parametrize(("swirl", "bridge", "far"), [(1, 1, 0), (1, 1, 1), (0, 1, 0), (1, 0, 0)])
 @pytest.mark.parametrize("UP", [-3.0, 0.5, 12.0])
-def test_the_slope_of_a_residual_is_its_derivative(element: str, far: float, UP: float) -> None:
+def test_the_slope_of_a_residual_is_its_derivative(element: str, swirl: int, bridge: int, far: int, UP: float) -> None:
     """Otherwise Newton's method is a guess; with it each term of the residual stands twice, by two hands."""
     fx = np.zeros(residual.N_NUM)
-    fx[[residual.N_SWIRL, residual.N_BRIDGE, residual.N_FAR]] = 1.0, 1.0, far
+    fx[[residual.N_SWIRL, residual.N_BRIDGE, residual.N_FAR]] = swirl, bridge, far
     fx[[residual.N_WAKE, residual.N_LIP, residual.N_STATOR, residual.N_GAP]] = 0.9, 0.1, 0.6, 0.4
     fx[[residual.N_LEAK, residual.N_WALL, residual.N_STREAM, residual.N_BEND]] = 0.05, 0.02, 0.1, 0.2
     UP = abs(UP) if element == "ducted_rotor" else UP

@@ -768,12 +768,6 @@ def test_a_flow_that_it_does_not_know_is_refused(bench: Bench, world: dict[str, 
         truth_world.loads(bench.rig.rotor, replace(bench.plain(), **world), bench.rows)
 
 
-def test_without_the_extra_it_says_so(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "wisdem.ccblade.ccblade", None)
-    with pytest.raises(InputError, match="wisdem"):
-        bench.measure(bench.plain(), StandErrors())
-
-
 @pytest.mark.slow
 def test_the_items_of_a_seed_do_not_depend_on_the_number_of_processes() -> None:
     plans = ((False, ("static_sweep",)), (False, ("static_sweep", "wall")))

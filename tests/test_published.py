@@ -5,7 +5,6 @@ The bounds are what the physics reaches without any fit to the table; where a bo
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 from pathlib import Path
 
@@ -14,12 +13,10 @@ import pytest
 
 from bemt.physics.air import Air
 from bemt.physics.bem import solver
-from bemt.physics.bem.duct import duct_flow
 from bemt.physics.effects import Effect, standard
 from bemt.physics.effects.lifting_surface import LiftingSurface
-from bemt.physics.sections.neuralfoil import neuralfoil_polar, tunnel_polar
-from geometry.airfoil import Airfoil, naca, naca4, parse_dat
-from geometry.duct import Duct
+from bemt.physics.sections.neuralfoil import neuralfoil_polar
+from geometry.airfoil import Airfoil, naca, parse_dat
 from geometry.rotor import Rotor, from_stations
 
 
@@ -72,60 +69,6 @@ def test_tmotor_28_static_thrust(shared_data: Path, more: tuple[Effect, ...], bo
     prep = solver.prepare(Rotor(blade, 2), tables, (*standard(), *more), mach_max=0.6)
     error = solver.solve(prep, rows[:, 0], 0.0, Air.from_density()).T / rows[:, 3] - 1
     assert abs(np.median(error)) < bound
-
-
-def _x22a(folder: Path, beta75: float, J: np.ndarray, exit_ratio: float) -> solver.Solution:
-    g = _table(folder / "x22a_geometry.csv")
-    R, hub = 1.0668, 0.2
-    shape = naca4(0.02, 0.4, 0.08)
-    blade = from_stations(g[:, 0] * R, g[:, 3], np.radians(g[:, 2] + beta75 - 20), R, hub * R, ((0.75, shape),))
-    rotor = Rotor(blade, 3)
-    gap = 0.4 * 0.0254
-    area = np.pi * R**2 * (1 - hub**2) * exit_ratio
-    duct = Duct(R + gap, 1.2446, 0.06 * 2 * R, gap, exit_radius=float(np.sqrt(area / np.pi)), rotor_x=0.3556)
-    prep = solver.prepare(rotor, [(0.75, tunnel_polar(shape))], duct=duct_flow(duct, rotor), mach_max=0.8)
-    return solver.solve(prep, 1200.0, J * 20 * 2 * R, Air.from_density())
-
-
-# X-22A full-scale ducted propeller, NASA TN D-4142 fig. 5 as digitised by two hands, which differ by up to 11 % at
-# J 0.55.  Not given: sections, hub, lip radius and exit area.  Declared: NACA 2408, hub 0.2 R, lip 6 % D, exit 1.27 of
-# the annulus (duct wall 18 % thick, trailing edge at half the thickness, hub faired out); 1.2 to 1.3 is its range.
-# The exit ratio was declared after 1.0 to 1.3 had been tried on this table, so the decay of thrust with J is no
-# independent proof of it: at 1.0 the thrust at J 0.5 is 45 % high.
-def test_x22a_total_thrust(shared_data: Path) -> None:
-    folder = shared_data / "x22a"
-    with (folder / "x22a_beta19_full_J_range.csv").open() as stream:
-        rows = [(float(q[1]), float(q[2])) for q in csv.reader(stream) if q[0] == "CT_total"]
-    J, CT = np.array([q for q in rows if q[0] <= 0.5]).T
-    assert np.max(np.abs(_x22a(folder, 19, J, 1.27).CT / CT - 1)) < 0.10
-    rows = _table(folder / "x22a_measured_CT_CP_vs_J.csv", usecols=(0, 1, 2, 3))
-    high = rows[rows[:, 0] == 29]
-    assert np.max(np.abs(_x22a(folder, 29, high[:, 1], 1.27).CT / high[:, 2] - 1)) < 0.10
-
-
-# Ka 4-70 in nozzle 19A (Oosterveld 1970, polynomials): marine screw, J = 0. Faults: the polynomials are fits; sections
-# are flat-faced segments (camber half the thickness here), chords scaled from the Ka 4-55 table.
-@pytest.mark.parametrize("pitch_ratio", [0.6, 0.8, 1.0, 1.2, 1.4])
-def test_ka_19a_duct_share_at_bollard(shared_data: Path, pitch_ratio: float) -> None:
-    folder = shared_data / "ducted_marine"
-    g = _table(folder / "ka4-55_geometry.csv")
-    ref = np.genfromtxt(folder / "ka_19A_open_water_table.csv", delimiter=",", names=True, dtype=None, encoding=None)
-    ref = ref[(ref["series"] == "Ka4-70_19A") & np.isclose(ref["P_over_D"], pitch_ratio) & (ref["J"] == 0)][0]
-    D = 0.24
-    x, chord = g[:, 0], g[:, 1] * 1e-3 * 70 / 55
-    t = g[:, 2] * D / chord
-    shapes = tuple((x[i], naca4(min(0.5 * t[i], 0.06), 0.5, min(t[i], 0.2))) for i in (0, 3, 5, 7))
-    beta = np.arctan(pitch_ratio / (np.pi * x))
-    rotor = Rotor(from_stations(x * D / 2, chord, beta, D / 2, 0.1 * D, shapes), 4)
-    L, gap = 0.5 * D, 0.001
-    duct = Duct(D / 2 + gap, L, 0.1825 * L, gap, exit_radius=D / 2 + gap + 0.0236 * L, rotor_x=0.5 * L)
-    incompressible = [e for e in standard() if not e.uses_mach]
-    tables = [(s, tunnel_polar(a)) for s, a in shapes]
-    prep = solver.prepare(rotor, tables, incompressible, duct=duct_flow(duct, rotor))
-    water = dataclasses.replace(Air.from_density(), rho=1000.0, mu=1e-3, a_sound=1500.0)
-    sol = solver.solve(prep, 600.0, 0.0, water)
-    assert sol.T_duct[0] / sol.T[0] == pytest.approx(ref["KT_nozzle"] / ref["KT_total"], rel=0.10)
-    assert sol.T[0] / (1000 * 100 * D**4) == pytest.approx(ref["KT_total"], rel=0.06)
 
 
 # NACA Report 594, propeller C, as digitised in the pyBEMT repository: 10 ft, three blades, Clark Y. Faults: its file

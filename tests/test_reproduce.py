@@ -197,17 +197,6 @@ def test_statistics_on_a_made_up_folder(tmp_path):
     assert reproduce.uiuc_statistics(empty) == {}
 
 
-def test_table_fits_a_hundred_columns(items):
-    text = reproduce.table(items)
-    assert max(map(len, text.splitlines())) <= 100
-    assert all(i.quantity in text for i in items)
-    starts = [line.index(s) for line in text.splitlines() for s in (th.INPUT, th.ABSENT) if line.endswith("  " + s)]
-    assert len(starts) > 40 and set(starts) == {72}  # no cell pushes its row out of line
-    assert all(len(i.quantity) <= 39 and len(i.stated) <= 10 and len(i.unit) <= 8 for i in items
-               if not isinstance(i.ours, str))  # fmt: skip
-    assert f"{len(items)} numbers" in text.splitlines()[-2] + text.splitlines()[-1]
-
-
 def test_command_prints_table_and_json(capsys, monkeypatch):
     monkeypatch.setattr(reproduce, "find_uiuc", lambda: None)
     assert reproduce.main([]) == 0

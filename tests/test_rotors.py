@@ -481,14 +481,6 @@ def test_calibrate_rotor_refuses_a_run_of_another_rotor_or_unit(
     assert "loads of this rotor" in capsys.readouterr().err and not known.exists()
 
 
-def test_population_says_where_it_comes_from() -> None:
-    p = population()
-    assert (
-        p.provenance["propellers"] > 50 and p.provenance["points"] > 1000 and "left_out.py" in p.provenance["command"]
-    )
-    assert "da4052" in p.families and all(np.all(np.linalg.eigvalsh(f.cov) > 0.0) for f in p.families.values())
-
-
 def test_paired_difference_knows_its_chance() -> None:
     random = np.random.default_rng(8)
     theirs = random.uniform(0.05, 0.2, 60)
