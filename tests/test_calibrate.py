@@ -11,7 +11,6 @@ import pytest
 
 from bemt.app import cli
 from bemt.base.errors import InputError
-from bemt.physics import coefficients as co
 from bemt.rotors import k1k2_calibration as calibrate
 from bemt.rotors import k1k2_calibration as fit
 from bemt.rotors import k1k2_points as gather
@@ -126,21 +125,6 @@ def test_a_table_with_units_gives_points(tmp_path: Path):
     assert points.CT[0] == pytest.approx(0.5 * 9.80665 / (1.225 * n**2 * D**4))
     assert points.J[2] == pytest.approx(5 / (100 * 9 * INCH))
     assert any("no density" in note for note in points.notes)
-
-
-def test_a_drive_calculator_table_gives_points_at_three_tip_speeds(tmp_path: Path):
-    file = tmp_path / "props.csv"
-    file.write_text(
-        "myid,tbs,Name,Dia,Pitch,a,b,AltThr,TmpThr,srcThr,c,d,AltPwr,TmpPwr,srcPwr,n10N,n100W\n"
-        "1,4,GWS HD 3-blade,9.0,5.0,14.0,2.0,0,15.0,x,0.25,3.0,0,15.0,x,8534.6,7368.1\n"
-    )
-    points = gather.load([file])
-    assert points.propellers[0].blades == 3 and points.rpm.size == 3
-    assert points.M_tip == pytest.approx([0.2, 0.3, 0.4])
-    n = points.rpm / 60
-    T = 14.0 * (points.rpm / 1000) ** 2 * 9.80665e-3
-    assert points.CT == pytest.approx(np.asarray(co.CT(T, 1.225, n, 9 * INCH)), rel=1e-3)
-    assert any("not measurements" in note for note in points.notes)
 
 
 def test_all_faults_at_once_and_reasons(tmp_path: Path, capsys: pytest.CaptureFixture[str]):

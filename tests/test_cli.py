@@ -168,7 +168,7 @@ def test_version() -> None:
 @pytest.mark.parametrize(
     "arguments",
     [["swep"], ["sweep", "cases", "--jobs", "0"], ["sweep", "cases", "--jobs", "two"], ["validate"],
-     ["validate", "x", "--reynolds", "10"], ["validate", "x", "--reynolds", "many"], ["fetch"]],
+     ["estimate", "8x5", "--rpm", "many"], ["fetch"]],
 )  # fmt: skip
 def test_wrong_usage_is_2_and_says_so_on_stderr(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert ended(arguments) == 2
@@ -252,12 +252,6 @@ def test_json_is_utf_8_whatever_the_terminal_is() -> None:
     env = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "latin-1"}
     done = subprocess.run([sys.executable, "-m", "bemt", "effects", "--json"], cwd=ROOT, env=env, capture_output=True)
     assert json.loads(done.stdout.decode("utf-8"))["schema"] == "bemt.effects/1"
-
-
-def test_polar_option_is_a_reynolds_number() -> None:
-    words = ["validate", "x", "--polar", "fixed:1e5", "--off", "swirl", "--off", "hub_loss"]
-    given = {"folders": ["x"], "reynolds": 1e5, "off": ["swirl", "hub_loss"]}
-    assert cli.parsed(words) == ("validate", given)
 
 
 @pytest.mark.parametrize(

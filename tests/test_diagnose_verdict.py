@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 from diagnosing import case, diagnose, left_out, points, recording
+from interval_scales import Off, calibrate
 
 from bemt.judge import loss
 from bemt.judge.diagnose import chain, fit, form, knowledge, noise
 from bemt.judge.diagnose.assemble import build
 from bemt.judge.diagnose.record import from_series
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation, Size
-from bemt.judge.proof.intervals import Off, calibrate
 from bemt.physics import effects
 from bemt.physics.bem import model as bem
 

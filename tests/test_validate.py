@@ -36,7 +36,7 @@ def _folder(path: Path, thrust: float = 1.0, power: float = 1.0, turned_deg: flo
     g = propeller.geometry
     assert g is not None
     true = (g.r_R, g.c_R, np.radians(g.beta_deg + turned_deg))
-    rows = points.compare(propeller, effects.standard(), None, true)
+    rows = points.compare(propeller, effects.standard(), true)
     CT, CP = rows.CT_bemt / thrust, rows.CP_bemt / power
     static = "".join(f"{n:.1f} {a:.9f} {b:.9f}\n" for n, a, b in zip(rows.rpm[:2], CT[:2], CP[:2], strict=True))
     (path / "some_10x5_static_0001xx.txt").write_text("RPM CT CP\n" + static)
@@ -98,7 +98,7 @@ def test_rotors_as_built_come_with_what_their_intervals_hold(tmp_path: Path) -> 
         for q in ("CT", "CP"):
             assert good[kind][q]["coverage"] == {"68": 1.0, "95": 1.0} and 0.01 < good[kind][q]["width68"] < 0.5
             assert bad[kind][q]["coverage"]["68"] < 0.3
-    drawn = propellers.validate(tmp_path / "good", as_drawn=True).document()
+    drawn = propellers.validate(tmp_path / "good", effects.without(effects.standard(), ["swirl"])).document()
     assert "coverage" not in drawn["static"]["CT"] and "as_drawn" not in drawn
 
 
@@ -134,15 +134,6 @@ def test_a_file_for_the_folder_is_called_a_file(tmp_path: Path) -> None:
         with pytest.raises(InputError) as caught:
             propellers.validate(tmp_path / name)
         assert str(caught.value) == f"{tmp_path / name}: got {got}; expected a folder in UIUC layout. Check the path."
-
-
-def test_fixed_reynolds_number_removes_the_dependence_on_speed(tmp_path: Path) -> None:
-    propeller = uiuc.scan_folder(_folder(tmp_path)).propellers[0]
-    incompressible = [e for e in effects.standard() if not e.uses_mach]
-    free = points.compare(propeller, incompressible)
-    fixed = points.compare(propeller, incompressible, fixed_re=5e4)
-    assert fixed.CT_bemt[0] == pytest.approx(fixed.CT_bemt[1], rel=1e-9)
-    assert abs(free.CT_bemt[0] / free.CT_bemt[1] - 1) > 1e-3
 
 
 def test_rule_is_one_table_for_small_and_one_for_large_reynolds_numbers() -> None:

@@ -123,7 +123,7 @@ EVERYWHERE = {
     "--hover-time": "--minutes", "--force": "--force-N", "--moment": "--moment-Nm", "--tolerance": "--tolerance-pct",
     "--repeatability": "--repeatability-pct", "--period": "--period-s", "--dir": "--out", "--from": "--source",
     "--compressible": "--solver compressible", "--incompressible": "--solver incompressible", "--plan": "",
-    "--polar": "--reynolds", "--point": "--points",
+    "--point": "--points",
     "--csv": "--out-csv", "--healthy-mass": "--healthy-mass-kg", "--out": "--picture",
 }  # fmt: skip
 """Old option to the new words; nothing where the value is a bare word now."""

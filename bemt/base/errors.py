@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 __all__ = [
-    "EXIT_INPUT", "EXIT_INTERNAL", "EXIT_OK", "EXIT_UNCONVERGED", "BemtWarning", "ConvergenceWarning", "Fault",
+    "EXIT_INPUT", "EXIT_INTERNAL", "EXIT_OK", "EXIT_UNCONVERGED", "BemtWarning", "Fault",
     "InputError", "RangeWarning", "gathered", "needs", "refuse", "system_fault",
 ]  # fmt: skip
 
@@ -204,10 +204,6 @@ def needs(module: str, extra: str) -> Any:
 
 class BemtWarning(UserWarning):
     """Base of the warnings of this project."""
-
-
-class ConvergenceWarning(BemtWarning):
-    """Some operating points have no solution; their values are NaN and they are flagged."""
 
 
 class RangeWarning(BemtWarning):

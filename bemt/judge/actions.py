@@ -314,8 +314,7 @@ def calibrate_rotor(
 def prove(
     *, size: Literal["small", "full", "stand", "ccblade", "real"] = "small", seed: int | None = None,
     jobs: Count | None = None, loop: Count | None = None, fixed: bool = False,
-    wired: bool = False, calibrate_intervals: Sequence[Path] = (), out: Path | None = None,
-    progress: Callable[[str], None] | None = None,
+    wired: bool = False, out: Path | None = None, progress: Callable[[str], None] | None = None,
 ) -> Told:  # fmt: skip
     """Hide causes in recordings, diagnose them, score the answers.
 
@@ -333,8 +332,6 @@ def prove(
         With a loop: a fixed programme of runs instead.
     wired : bool
         With a loop and size stand: measure everything on simulated stands in other processes, through their wire.
-    calibrate_intervals : sequence of paths
-        Folders of kept proofs made with the current interval factors: write new factors instead.
     out : path, optional
         Folder that keeps items, key, answers and score.
     progress : callable, optional
@@ -362,8 +359,8 @@ def prove(
 
     from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
     from bemt.base.plugins import load, missing, offered
-    from bemt.judge.proof import intervals, score
     from bemt.judge.proof import loop as looping
+    from bemt.judge.proof import score
     from bemt.judge.proof.prove import prove as run
 
     got, hands = f"size {size}" + ("" if out else " without out"), offered("HANDS").get("wired") if wired else None
@@ -375,12 +372,10 @@ def prove(
     ):
         if wrong:
             raise InputError(Fault(option, "", told, expected, *hint))
-    if calibrate_intervals:
-        return Told({"schema": "bemt.intervals/1"}, intervals.rewrite([File(p) for p in calibrate_intervals], out))
     say, cores = progress or (lambda line: None), jobs or os.cpu_count() or 1
     found = run(None if out is None else os.fspath(out), size, seed, jobs, say, lambda line: say(f"{line}\n"))
-    told = [score.text(found)]
+    parts = [score.text(found)]
     if loop:
-        told.append(looping.loop(File(out or "."), loop, cores, fixed, say, load(hands) if hands else None).text)
+        parts.append(looping.loop(File(out or "."), loop, cores, fixed, say, load(hands) if hands else None).text)
     code = EXIT_OK if all(row.met is not False for row in found.score) else EXIT_UNCONVERGED
-    return Told(found.document(), "\n\n".join(told), exit_code=code)
+    return Told(found.document(), "\n\n".join(parts), exit_code=code)

@@ -24,8 +24,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bemt.base.units import KGF
-
 CT_PER_ROTOR = math.pi**3 / 4.0
 """CT / CT_rotor [-]: A (Omega R)^2 = (pi^3/4) n^2 D^4."""
 CP_PER_ROTOR = math.pi**4 / 4.0
@@ -184,16 +182,6 @@ def FM(CT: ArrayLike, CP: ArrayLike) -> Any:
     return _ratio(math.sqrt(2.0 / math.pi) * np.maximum(CT, 0.0) ** 1.5, CP, (CP > 0) & (CT >= 0))
 
 
-def grams_per_watt(T: ArrayLike, P: ArrayLike) -> Any:
-    """Gram-force of thrust per watt of shaft power; NaN where P <= 0. [gf/W]
-
-    >>> round(grams_per_watt(9.80665, 100.0), 6)
-    10.0
-    """
-    P = _f(P)
-    return _ratio(_f(T) * 1000.0 / KGF, P, P > 0)
-
-
 def M_tip(n: ArrayLike, D: ArrayLike, a_sound: ArrayLike) -> Any:
     """Rotational tip Mach number.
 
@@ -220,23 +208,3 @@ def Re75(chord75: ArrayLike, n: ArrayLike, D: ArrayLike, V: ArrayLike, rho: Arra
     """
     W = np.hypot(0.75 * math.pi * _f(n) * _f(D), _f(V))
     return _out(_f(rho) * W * _f(chord75) / _f(mu))
-
-
-def to_rotor(CT: ArrayLike, CP: ArrayLike) -> tuple[Any, Any]:
-    """Propeller convention to helicopter convention.
-
-    >>> CT_rotor, CP_rotor = to_rotor(0.1, 0.04)
-    >>> round(CT_rotor, 5), round(CP_rotor, 6)
-    (0.0129, 0.001643)
-    """
-    return _out(_f(CT) / CT_PER_ROTOR), _out(_f(CP) / CP_PER_ROTOR)
-
-
-def from_rotor(CT_rotor: ArrayLike, CP_rotor: ArrayLike) -> tuple[Any, Any]:
-    """Helicopter convention to propeller convention; the inverse of `to_rotor`.
-
-    >>> CT, CP = from_rotor(0.0046, 0.0003)
-    >>> round(CT, 5), round(CP, 6)
-    (0.03566, 0.007306)
-    """
-    return _out(_f(CT_rotor) * CT_PER_ROTOR), _out(_f(CP_rotor) * CP_PER_ROTOR)

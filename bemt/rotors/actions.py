@@ -289,9 +289,8 @@ def measured_rotors(query: str | Sequence[str] = "") -> Told:
 
 @action("Models and checks", "validate uiuc", words=("folders",))
 def validate(
-    folders: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], *, reynolds: float | None = None,
-    off: Sequence[str] = (), match_J0: bool = False, as_drawn: bool = False,
-    out: str | os.PathLike[str] | None = None, progress: Callable[[str], None] | None = None,
+    folders: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], *, off: Sequence[str] = (),
+    match_J0: bool = False, out: str | os.PathLike[str] | None = None, progress: Callable[[str], None] | None = None,
 ) -> Told:  # fmt: skip
     """Compare BEMT with folders of measured propellers in UIUC layout.
 
@@ -299,14 +298,10 @@ def validate(
     ----------
     folders : path or sequence of paths
         Folders with geometry, static and J files, or ``uiuc`` for the installed data.
-    reynolds : float, optional
-        Section tables at this one Reynolds number. [1]
     off : sequence of str
-        Effects to switch off.
+        Effects to switch off; the stations are then taken as given, without the population of rotors as built.
     match_J0 : bool
         Also turn each blade to the measured zero-thrust J (an experiment that uses the measurement).
-    as_drawn : bool
-        Use the stations as given, without the population of rotors as built.
     out : str or path, optional
         Folder for the tables.
     progress : callable, optional
@@ -331,15 +326,13 @@ def validate(
     """
     import os
 
-    from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
+    from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
     from bemt.base.given import paths_text
     from bemt.rotors.validate import propellers
 
-    if reynolds is not None and not 1e3 <= reynolds <= 1e9:
-        raise InputError(Fault("", "--reynolds", f"{reynolds:g}", "a Reynolds number from 1e3 to 1e9"))
     effects = propellers.effects_without(off)
     found = [propellers.where(name) for name in paths_text("folders", folders, 1)]
-    made = propellers.validate(found, effects, reynolds, progress, match_J0=match_J0, as_drawn=as_drawn)
+    made = propellers.validate(found, effects, progress, match_J0)
     if out is not None:
         propellers.write(made, os.fspath(out))
     code = EXIT_UNCONVERGED if made.unconverged else EXIT_OK

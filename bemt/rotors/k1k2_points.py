@@ -1,15 +1,13 @@
-"""Measured points gathered for a calibration: diameter, pitch, speed and thrust, from any importer that has them.
+"""Measured points gathered for a calibration: diameter, pitch, speed and thrust.
 
-UIUC folders and files, APC performance files (the vendor's computation), Drive Calculator's table (power laws, taken at
-three tip speeds), and any table with the columns (or ``recording.toml`` constants) diameter, pitch, rpm and thrust or
-CT; further columns are airspeed or J, density, blades, ducted (0 or 1), name.
+UIUC folders and files, and any table with the columns (or ``recording.toml`` constants) diameter, pitch, rpm and thrust
+or CT; further columns are airspeed or J, density, blades, ducted (0 or 1), name.
 """
 
 from __future__ import annotations
 
 import os
-import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,20 +19,16 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, gathered, refuse
 from bemt.base.given import find_data
 from bemt.base.tables import number_of
-from bemt.base.units import INCH, ZERO_CELSIUS
+from bemt.base.units import INCH
 from bemt.data import readers as importers
-from bemt.data.readers import apc, uiuc
+from bemt.data.readers import uiuc
 from bemt.data.readers.uiuc_names import parse_file_name
 from bemt.physics import coefficients as co
-from bemt.physics.air import Air, isa_pressure
+from bemt.physics.air import Air
 from bemt.physics.dataset import Dataset
 
 RHO = 1.225
 """Density where a source states none [kg/m3]; coefficients do not depend on it."""
-LAW_M_TIP = (0.2, 0.3, 0.4)
-"""Tip Mach numbers at which a power law stands for measurements [-]."""
-_BLADES = re.compile(r"(\d)\s*-?\s*(?:blatt|blades?|bl\b)", re.IGNORECASE)
-_DUCTED = re.compile(r"impeller|\bedf\b|ducted", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -141,46 +135,6 @@ def _from_uiuc_table(path: Path, table: Any) -> tuple[list[Rows], list[str]]:
     return [], [f"{path}: geometry only"]
 
 
-def _from_apc(found: apc.ApcPerformance) -> list[Rows]:
-    s = found.series
-    made = MeasuredPropeller(found.name, "APC", "APC, computed", found.diameter_m, found.pitch_m, found.blades)
-    return [(made, s.rpm, s.J, s.CT)]
-
-
-def _from_drivecalc(path: Path, found: Dataset) -> list[Rows]:
-    """Power laws at `LAW_M_TIP`, in the air that the table states for them."""
-    names = found.texts.get("Name", ("",) * len(found))
-    nothing = np.full(len(found), np.nan)
-    rows: list[Rows] = []
-    for i, name in enumerate(names):
-        D, pitch = found.diameter_m[i], found.pitch_m[i]
-        a, b = found.thrust_law_N[i], found.thrust_exponent[i]
-        if not (D > 0 and pitch > 0 and a > 0 and b > 1.0):
-            continue
-        blades = _BLADES.search(name)
-        made = MeasuredPropeller(
-            f"{name} {D / INCH:.3g}x{pitch / INCH:.3g}", name.split()[0] if name.split() else "?", "Drive Calculator",
-            D, pitch, int(blades[1]) if blades else 2, ducted=_DUCTED.search(name) is not None,
-        )  # fmt: skip
-        rpm = np.array(LAW_M_TIP) * Air.from_density().a_sound / (np.pi * D) * 60.0
-        limit = found.values.get("max_rpm", nothing)[i]
-        rpm = rpm[rpm <= limit] if limit > 0 else rpm
-        n = rpm / 60.0
-        T = a * (rpm / 1000.0) ** b
-        CT = np.asarray(co.CT(T, _density(found.values, i), n, D))
-        rows.append((made, rpm, np.zeros_like(rpm), CT))
-    return rows
-
-
-def _density(c: Mapping[str, Array], i: int) -> float:
-    h, T = (c[f"thrust_{k}"][i] if f"thrust_{k}" in c else float("nan") for k in ("altitude_m", "temperature_K"))
-    if not (np.isfinite(h) and -500.0 <= h <= 5000.0):
-        return RHO
-    p, T_isa = isa_pressure(float(h))
-    celsius = (T if 200.0 < T < 330.0 else T_isa) - ZERO_CELSIUS
-    return Air.from_state(p, float(celsius)).rho
-
-
 def _groups(
     names: Sequence[str], D: Array, pitch: Array, B: Array, duct: Array
 ) -> tuple[dict[tuple[Any, ...], list[int]], int]:
@@ -253,12 +207,8 @@ def _file(path: Path) -> tuple[list[Rows], list[str], list[str]]:
         found = importers.read(path)
     except InputError as error:
         return [], [str(fault) for fault in error.faults], []
-    if isinstance(found, apc.ApcPerformance):
-        return _from_apc(found), [], [f"{path}: computed by the vendor, not measured"]
     if isinstance(found, (uiuc.UiucStatic, uiuc.UiucLine, uiuc.UiucGeometry, uiuc.UiucThickness)):
         return *_from_uiuc_table(path, found), []
-    if isinstance(found, Dataset) and found.format == "drivecalc" and "thrust_law_N" in found:
-        return _from_drivecalc(path, found), [], [f"{path}: power laws fitted by others, not measurements"]
     if isinstance(found, Dataset):
         return _from_table(path, found)
     return [], [f"{path}: a {type(found).__name__} says nothing of diameter, pitch, rpm and thrust"], []

@@ -85,21 +85,7 @@ class MeasuredRotor:
         return prior, ReferenceRun(self.at, self.left, self.excess * noise, self.size)
 
 
-_SENSED = ("J", "alpha_deg", "Re", "f", "top", "T")
-
-
-def packed(rotors: list[MeasuredRotor]) -> dict[str, Array]:
-    """Arrays of the shipped file, a row for each propeller."""
-    out = {"latents": np.array(NAMES)}
-    for name in ("name", "family", "volume"):
-        out[name] = np.array([getattr(one, name) for one in rotors])
-    for name in ("diameter_in", "pitch_in", "chord", "camber", "offset_deg", "excess", "size"):
-        out[name] = np.array([getattr(one, name) for one in rotors])
-    out["blades"] = np.array([one.blades for one in rotors])
-    for name in ("mean", "cov", "stations", "stations_sd", "rpm", "y", "single", "left"):
-        out[name] = np.array([getattr(one, name) for one in rotors], dtype=np.float32)
-    out["diameter_m"] = np.array([one.at.diameter_m for one in rotors])
-    return out | {k: np.array([getattr(one.at, k) for one in rotors], dtype=np.float32) for k in _SENSED}
+SENSED = ("J", "alpha_deg", "Re", "f", "top", "T")
 
 
 @cache
@@ -113,7 +99,7 @@ def records() -> dict[str, MeasuredRotor]:
         v: dict[str, Any] = {
             key: np.asarray(rows[i], dtype=float) for key, rows in raw.items() if rows.dtype.kind == "f"
         }
-        at = Sensed(float(v.pop("diameter_m")), *(v.pop(name) for name in _SENSED))
+        at = Sensed(float(v.pop("diameter_m")), *(v.pop(name) for name in SENSED))
         v = {key: float(value) if value.ndim == 0 else value for key, value in v.items()}
         v |= {key: str(raw[key][i]) for key in ("name", "family", "volume")}
         return MeasuredRotor(blades=int(raw["blades"][i]), at=at, **v)

@@ -109,7 +109,8 @@ def leave_out(seen: Sequence[Observed], name: str, fitted: tuple[Population, Any
             pools["as_drawn"].add(one.drawn)
             if one.record.static.any() and not one.record.static.all():
                 for on in ("static", "static_and_one"):
-                    pools[f"on_{on}"].add_kind(conditioned(one, p, on), "forward")
+                    told = conditioned(one, p, on)
+                    pools[f"on_{on}"].add(told.rows, told, ("forward",))
     out = {"schema": SCHEMA, "folder": name, "families": families} | {
         k: pool.total().document() for k, pool in pools.items()
     }

@@ -168,6 +168,20 @@ def table(of: Sequence[Predicted]) -> str:
     return "\n".join(lines)
 
 
+def packed(rotors: list[MeasuredRotor]) -> dict[str, np.ndarray]:
+    """Arrays of the shipped file, a row for each propeller."""
+    out = {"latents": np.array(measured.NAMES)}
+    for name in ("name", "family", "volume"):
+        out[name] = np.array([getattr(one, name) for one in rotors])
+    for name in ("diameter_in", "pitch_in", "chord", "camber", "offset_deg", "excess", "size"):
+        out[name] = np.array([getattr(one, name) for one in rotors])
+    out["blades"] = np.array([one.blades for one in rotors])
+    for name in ("mean", "cov", "stations", "stations_sd", "rpm", "y", "single", "left"):
+        out[name] = np.array([getattr(one, name) for one in rotors], dtype=np.float32)
+    out["diameter_m"] = np.array([one.at.diameter_m for one in rotors])
+    return out | {k: np.array([getattr(one.at, k) for one in rotors], dtype=np.float32) for k in measured.SENSED}
+
+
 def main(words: list[str] | None = None) -> int:
     """Write the file."""
     parser = argparse.ArgumentParser(description="Measured propellers as reference runs.")
@@ -193,7 +207,7 @@ def main(words: list[str] | None = None) -> int:
             continue
         made.append(record(seen, population()))
     if made:
-        np.savez_compressed(args.out, **measured.packed(made))
+        np.savez_compressed(args.out, **packed(made))
     return 0
 
 

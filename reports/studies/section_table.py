@@ -32,6 +32,22 @@ def run(camber: float, position: float, thickness: float, n_crit: float) -> np.n
     return np.stack([raw.cl, np.log(raw.cd), raw.confidence])
 
 
+def pack(values: np.ndarray) -> np.ndarray:
+    """Round to `neuralfoil.STEPS` and take differences along camber, thickness and n_crit: bytes that compress well.
+
+    Confidence is rounded to the middle of its unit: what was above one half stays so.
+    """
+    units = [np.rint(values[..., 0, :, :] / neuralfoil.STEPS[0]), np.rint(values[..., 1, :, :] / neuralfoil.STEPS[1]),
+             np.floor(values[..., 2, :, :] / neuralfoil.STEPS[2])]  # fmt: skip
+    whole = np.stack(units, axis=4).astype(np.int32)
+    for axis in (1, 2, 3):
+        whole = np.diff(whole, axis=axis, prepend=0)
+    flat = whole.astype("<i2")
+    if not np.array_equal(flat, whole):
+        raise ValueError("got differences beyond 16 bits; expected a finer grid")
+    return np.ascontiguousarray(np.moveaxis(flat.view(np.uint8).reshape(*flat.shape, 2), -1, 0))
+
+
 def write(path: Path) -> None:
     """Make the table."""
     shape = tuple(len(NODES[name]) for name in neuralfoil.AXES)
@@ -41,7 +57,7 @@ def write(path: Path) -> None:
         values[at] = run(m, p, t, n)
     nodes = {name: np.array(NODES[name]) for name in neuralfoil.AXES}
     made_with = f"NeuralFoil {cache.installed_version('neuralfoil')} xlarge"
-    np.savez_compressed(path, packed=neuralfoil.pack(values), alpha_deg=neuralfoil.RAW_DEG, Re=RE,
+    np.savez_compressed(path, packed=pack(values), alpha_deg=neuralfoil.RAW_DEG, Re=RE,
                         made_with=np.array(made_with), **nodes)  # fmt: skip
     print(f"{path}: {values.shape}, {path.stat().st_size / 1e6:.2f} MB, {made_with}")
 

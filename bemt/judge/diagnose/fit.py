@@ -2,7 +2,7 @@
 
 Intervals are widened so that as many hold the truth as they say (split conformal calibration). A half-width times the
 factor of its parameter (of its kind of fault, where few were seen) held 90 % of the truths in the development sets that
-``bemt lab prove --calibrate-intervals DIR`` drew (Vovk, Gammerman and Shafer 2005, Algorithmic Learning in a Random
+``reports/studies/interval_scales.py`` was given (Vovk, Gammerman and Shafer 2005, Algorithmic Learning in a Random
 World, ch. 4; Lei et al. 2018, J. Am. Stat. Assoc. 113:1094). The file says which seeds and version.
 """
 

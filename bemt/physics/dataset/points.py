@@ -60,10 +60,6 @@ def _frozen(array: ArrayLike) -> Array:
 _UNKNOWN = _frozen(np.nan)
 
 
-def _root_sums(parts: Mapping[str, Sequence[Array]]) -> dict[str, Array]:
-    return {key: _frozen(np.sqrt(np.sum(np.square(each), axis=0))) for key, each in parts.items() if each}
-
-
 def _plain(value: Any) -> Any:
     return {key: _plain(item) for key, item in value.items()} if isinstance(value, Mapping) else value
 
@@ -151,7 +147,9 @@ class Dataset:
         u_by = {origin: checked(f"u_by.{origin}", parts) for origin, parts in self.u_by.items()}
         for origin in u_by.keys() - set(ORIGINS):
             found.append((f"u_by.{origin}", "an unknown origin", f"one of {', '.join(ORIGINS)}", ""))
-        u |= _root_sums({key: [part[key] for part in u_by.values() if key in part] for key in values.keys() - u.keys()})
+        for key in values.keys() - u.keys():
+            if each := [part[key] for part in u_by.values() if key in part]:
+                u[key] = _frozen(np.sqrt(np.sum(np.square(each), axis=0)))
         if found:
             file = self.file or self.name
             raise InputError([Fault(file, *fault) for fault in found])

@@ -65,24 +65,8 @@ class ShippedTable(NamedTuple):
     made_with: str
 
 
-def pack(values: Array) -> NDArray[np.uint8]:
-    """Round to `STEPS` and take differences along camber, thickness and n_crit: bytes that compress well.
-
-    Confidence is rounded to the middle of its unit: what was above one half stays so.
-    """
-    units = [np.rint(values[..., 0, :, :] / STEPS[0]), np.rint(values[..., 1, :, :] / STEPS[1]),
-             np.floor(values[..., 2, :, :] / STEPS[2])]  # fmt: skip
-    whole = np.stack(units, axis=4).astype(np.int32)
-    for axis in (1, 2, 3):
-        whole = np.diff(whole, axis=axis, prepend=0)
-    flat = whole.astype("<i2")
-    if not np.array_equal(flat, whole):
-        raise ValueError("got differences beyond 16 bits; expected a finer grid")
-    return np.ascontiguousarray(np.moveaxis(flat.view(np.uint8).reshape(*flat.shape, 2), -1, 0))
-
-
 def unpack(packed: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Values of `pack`, rounded."""
+    """Values of bytes: differences along camber, thickness and n_crit in units of `STEPS`."""
     whole = np.ascontiguousarray(np.moveaxis(packed, 0, -1)).view("<i2")[..., 0].astype(np.int32)
     for axis in (1, 2, 3):
         np.cumsum(whole, axis=axis, out=whole)

@@ -106,19 +106,15 @@ def measured(propeller: UiucPropeller) -> tuple[NDArray[np.bool_], Array, Array,
 class Solver:
     """CT and CP of a propeller on its stations, with any latent numbers; the rotor of the last ones is kept."""
 
-    def __init__(
-        self, propeller: UiucPropeller, effects: Sequence[Effect], fixed_re: float | None, stations: Stations | None
-    ) -> None:
+    def __init__(self, propeller: UiucPropeller, effects: Sequence[Effect], stations: Stations | None) -> None:
         from bemt.physics.air import Air
-        from bemt.physics.sections import polars
         from bemt.physics.sections.neuralfoil import neuralfoil_polar
 
         self.rotor = build(propeller, stations)
         self.air = Air.from_density()
         self.diameter_m = propeller.diameter_m
         self._effects = tuple(effects)
-        tables = [(x, neuralfoil_polar(shape)) for x, shape in self.rotor.blade.anchors]
-        self._tables = [(x, polars.fixed_re(t, fixed_re) if fixed_re else t) for x, t in tables]
+        self._tables = [(x, neuralfoil_polar(shape)) for x, shape in self.rotor.blade.anchors]
         self._last: tuple[bytes, Any] = (b"", None)
 
     def __call__(self, z: Array, rpm: Array, J: Array, which: Any = None) -> Array:
@@ -136,12 +132,9 @@ class Solver:
         return np.array([found.CT, found.CP])
 
 
-def compare(
-    propeller: UiucPropeller, effects: Sequence[Effect], fixed_re: float | None = None,
-    stations: Stations | None = None,
-) -> Rows:  # fmt: skip
+def compare(propeller: UiucPropeller, effects: Sequence[Effect], stations: Stations | None = None) -> Rows:
     """Solve every measured point of one propeller."""
-    return rows(propeller, Solver(propeller, effects, fixed_re, stations))
+    return rows(propeller, Solver(propeller, effects, stations))
 
 
 def rows(propeller: UiucPropeller, solve: Solver, z: Array | None = None) -> Rows:
@@ -344,7 +337,7 @@ class Expected:
 
 def observe(propeller: UiucPropeller, effects: Sequence[Effect], stations: Stations) -> Observed:
     """Solve one propeller at its points with the slopes."""
-    solve = Solver(propeller, effects, None, stations)
+    solve = Solver(propeller, effects, stations)
     drawn = rows(propeller, solve)
     here = np.logical_or.reduce(list(counted(drawn).values())) & np.isfinite(drawn.CT_bemt)
     rotor = solve.rotor
@@ -401,8 +394,8 @@ class Pool:
     def __init__(self) -> None:
         self._found: dict[tuple[str, str, str], list[Array]] = {}
 
-    def add(self, rows: Rows, expected: Expected | None = None) -> ErrorTotals:
-        """Take the points of one propeller; returns its own statistics."""
+    def add(self, rows: Rows, expected: Expected | None = None, kinds: Sequence[str] = KINDS) -> ErrorTotals:
+        """Take the points of one propeller, of these kinds; returns its own statistics."""
         own = Pool()
         for kind, found in errors(rows).items():
             for q, e in found.items():
@@ -412,17 +405,10 @@ class Pool:
                     own._found[kind, q, "width"] = [expected.width[kind][q]]
                     own._found[kind, q, "log_density"] = [expected.log_density[kind][q]]
         for key, values in own._found.items():
-            self._found.setdefault(key, []).extend(values)
+            if key[0] in kinds:
+                self._found.setdefault(key, []).extend(values)
         sums = own.total()
         return ErrorTotals(replace(sums.static, propellers=None), replace(sums.forward, propellers=None))
-
-    def add_kind(self, expected: Expected, kind: str) -> None:
-        """Take the points of one kind only."""
-        own = Pool()
-        own.add(expected.rows, expected)
-        for key, values in own._found.items():
-            if key[0] == kind:
-                self._found.setdefault(key, []).extend(values)
 
     def total(self) -> ErrorTotals:
         """Statistics over all points; ``log_score`` is a mean over propellers of the mean log density of their

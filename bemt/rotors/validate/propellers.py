@@ -62,13 +62,13 @@ def shift_to(J0: float, J0_of: Callable[[float], float]) -> float:
 
 
 def matched(
-    propeller: UiucPropeller, effects: Sequence[Effect], fixed_re: float | None, stations: Stations, J0: float
+    propeller: UiucPropeller, effects: Sequence[Effect], stations: Stations, J0: float
 ) -> tuple[float, Rows] | None:
     """Solve one propeller with its blades turned to the measured zero-thrust advance ratio. [deg]"""
     x, c, beta = stations
 
     def at(shift_deg: float) -> Rows:
-        return compare(propeller, effects, fixed_re, (x, c, beta + np.radians(shift_deg)))
+        return compare(propeller, effects, (x, c, beta + np.radians(shift_deg)))
 
     shift = shift_to(J0, lambda d: at(d).J0_bemt)
     return (shift, at(shift)) if np.isfinite(shift) else None
@@ -113,7 +113,6 @@ class SectionRule(Documented):
 
     n_crit: float
     drag_level: float
-    fixed_re: float | None
     rule: str = "bemt.physics.sections.rule"
     calibrated_on: str = "UIUC volume 1"
 
@@ -214,8 +213,7 @@ def text(doc: Validation) -> str:
             f"{high:+.1f} for 80 %) to the measured zero-thrust J; an experiment that uses the measurement."
         )
     lines.append(
-        f"Sections: declared rule, calibrated on {p.calibrated_on}: n_crit {p.n_crit:g}, drag x{p.drag_level:g}"
-        + (f", Reynolds number fixed at {p.fixed_re:g}." if p.fixed_re else ".")
+        f"Sections: declared rule, calibrated on {p.calibrated_on}: n_crit {p.n_crit:g}, drag x{p.drag_level:g}."
     )
     lines.append("Effects on: " + ", ".join(e["id"] for e in doc.effects) + ".")
     if doc.unconverged:
@@ -229,8 +227,8 @@ SCHEMA = "bemt.validation/1"
 
 
 def validate(
-    folder: Path | Sequence[Path], effects: Sequence[Effect] | None = None, fixed_re: float | None = None,
-    progress: Callable[[str], None] | None = None, match_J0: bool = False, as_drawn: bool = False,
+    folder: Path | Sequence[Path], effects: Sequence[Effect] | None = None,
+    progress: Callable[[str], None] | None = None, match_J0: bool = False,
 ) -> Validation:  # fmt: skip
     """Compare a folder."""
     from bemt.physics import effects as registry
@@ -239,7 +237,7 @@ def validate(
     folders = [folder] if isinstance(folder, Path) else list(folder)
     found = read_folders(folders)
     eff = registry.standard() if effects is None else tuple(effects)
-    built = not as_drawn and fixed_re is None and {e.id for e in eff} == {e.id for e in registry.standard()}
+    built = {e.id for e in eff} == {e.id for e in registry.standard()}
     rows: list[ValidatedRotor] = []
     pool, drawn, turned = Pool(), Pool(), Pool()
     shifts: list[float] = []
@@ -254,10 +252,10 @@ def validate(
             expected = expect(seen, population())
             points, own, as_given = seen.drawn, pool.add(expected.rows, expected), drawn.add(seen.drawn)
         else:
-            points = compare(p, eff, fixed_re, stations)
+            points = compare(p, eff, stations)
             own = pool.add(points)
         unconverged += int(np.count_nonzero(~np.isfinite(points.CT_bemt)))
-        fit = matched(p, eff, fixed_re, stations, points.J0) if match_J0 else None
+        fit = matched(p, eff, stations, points.J0) if match_J0 else None
         shifted = None
         if fit is not None:
             at = turned.add(fit[1])
@@ -276,7 +274,7 @@ def validate(
     return Validation(
         whole.static, whole.forward, " ".join(f.name for f in folders), J_SHARE,
         ZeroThrustErrors(zero.median_abs, zero.p90_abs, zero.bias, propellers=len(J0)), unconverged,
-        tuple(e.describe() for e in eff), SectionRule(section_rule.N_CRIT, section_rule.DRAG_LEVEL, fixed_re),
+        tuple(e.describe() for e in eff), SectionRule(section_rule.N_CRIT, section_rule.DRAG_LEVEL),
         tuple(rows), tuple(Skipped(name, why) for name, why in found.skipped), tuple(found.faults),
         drawn.total() if built else None, dict(population().provenance) if built else None,
         TurnedErrors(again.static, again.forward, len(shifts), spread) if match_J0 else None,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -450,13 +450,9 @@ def _in_duct(
         changes["blade.section"] = table
     if not changes:
         return case
-    changes["assumptions"] = [a for a in case.written.get("assumptions", ()) if not _settled(a["key"], changes)]
+    changes["assumptions"] = [a for a in case.written.get("assumptions", ())
+                              if not any(f"{a['key']}.".startswith(f"{done}.") for done in changes)]  # fmt: skip
     return with_changes(case, changes)
-
-
-def _settled(key: str, changes: Mapping[str, Any]) -> bool:
-    """Whether an unknown is one no more."""
-    return any(key == done or key.startswith(f"{done}.") for done in changes)
 
 
 def case_files(base: Case, found: search.Optimum, points: Sequence[DesignPoint]) -> dict[str, bytes]:

@@ -1,5 +1,8 @@
 """How far told intervals miss on a development set, and the factors that make them hold.
 
+``python reports/studies/interval_scales.py DIR ... --out bemt/judge/diagnose/interval_scales.json`` writes the factors
+on the intervals that kept proofs (``bemt lab prove --out DIR``) show.
+
 Items are those of kept proofs whose cause was named: only then does anybody read an interval.  The score of a parameter
 is how many half-widths, before the factor in use, the truth lies away; the new factor is the quantile of the scores
 that a new item stays below in nine cases of ten (split conformal).  Half-widths end at physical ranges.
@@ -7,7 +10,7 @@ that a new item stays below in nine cases of ten (split conformal).  Half-widths
 
 from __future__ import annotations
 
-import os
+import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +20,7 @@ import numpy as np
 
 from bemt import __version__
 from bemt.base.tables import json_text, write_atomic
-from bemt.judge.diagnose.fit import FILE, scale_of
+from bemt.judge.diagnose.fit import scale_of
 from bemt.judge.proof import rows
 from bemt.judge.proof.rows import Entry, Estimate
 from bemt.judge.proof.score import VISIBLE, judge
@@ -100,9 +103,16 @@ def _factor(scores: Sequence[float]) -> dict[str, float]:
     return {"scale": round(scale, 3), "n": n, "held": round(float(np.mean(np.array(scores) <= 1.0)), 3)}
 
 
-def rewrite(folders: Sequence[Path], out: str | os.PathLike[str] | None) -> str:
-    """Write the factors on the intervals that kept proofs show; gives the file's name."""
-    sets, found = zip(*(misses(folder) for folder in folders), strict=True)
-    target = Path(out or ".") / FILE
-    write_atomic(target, json_text(calibrate([m for some in found for m in some], sets)))
-    return target.as_posix()
+def main(words: list[str] | None = None) -> int:
+    """Write the factors."""
+    parser = argparse.ArgumentParser(description="Factors on the intervals of a diagnosis.")
+    parser.add_argument("folders", metavar="DIR", nargs="+", type=Path, help="kept proofs")
+    parser.add_argument("--out", metavar="FILE", type=Path, required=True)
+    args = parser.parse_args(words)
+    sets, found = zip(*(misses(folder) for folder in args.folders), strict=True)
+    write_atomic(args.out, json_text(calibrate([m for some in found for m in some], sets)))
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
