@@ -19,7 +19,7 @@ from bemt.rotors.case.prepare import prepare_case
 from bemt.tools.design import optimise as search
 from bemt.tools.design.minimum_loss import CONTROLS, actuator_disk, minimum_loss, without_drag
 from bemt.tools.design.problem import _CL, _W, BladeProblem
-from bemt.tools.design.requirement import MATERIALS, DesignPoint, SectionStrength, required, stress
+from bemt.tools.design.requirement import DesignPoint, SectionStrength, required, stress
 from geometry.airfoil import naca
 from geometry.laws import from_laws
 from geometry.rotor import Rotor
@@ -254,7 +254,3 @@ def test_stress_of_a_spinning_bar_and_of_a_cantilever() -> None:
     assert bent.value[inner] == pytest.approx((moment * 0.05 * c / (1e-4 * c**4))[inner], rel=0.01)
     turned = stress(bar, 0.0, 2, 0.0, r, dr, chord, 0.5 * np.pi * ones, load)  # along the chord: the stiff way
     assert turned.value[0] == pytest.approx(moment[0] * 0.5 * c / (1e-2 * c**4), rel=0.01)
-
-
-def test_materials_state_their_source() -> None:
-    assert all(m.source and m.density > 500.0 and m.strength_MPa > 5.0 for m in MATERIALS.values())

@@ -254,14 +254,6 @@ def test_ranges_of_a_population_survive_its_file() -> None:
     assert Validity.of_rotors([COVERED, COVERED]) == COVERED
 
 
-def test_widths_are_those_of_the_prior() -> None:
-    p = population()
-    for known in ("cad", "scan", "stations", "label"):
-        sd, nu = p.widths(known, 0.076)
-        assert sd == pytest.approx(p.prior(known, 0.076, section="rule").sd) and np.all(nu > 1.0)
-    assert p.widths("label", 0.254)[1][0] < p.widths("stations", 0.254)[1][0]  # labels err more heavily
-
-
 def _family(name: str, angle_deg: float, n: int, seed: int) -> list[ComparedRotor]:
     """Rotors whose blades all stand off their drawings by the same angle."""
     out = []

@@ -37,9 +37,6 @@ CHORD_SD, CHORD_SD_SMALL = 0.15, 0.35
 """Scatter of ln(lift) and ln(drag) for a chord that only the label tells, from 7 in up and below, calibrated: of six
 pairs the one that predicts 175 propellers of UIUC from their labels best (mean log score, families by the root of their
 size); their chords scatter by 0.17 around the law [1]."""
-LABEL_NU = 2.9
-"""Degrees of freedom of Student's t fitted to the differences of stations and labels of 87 propellers of UIUC (scale
-1.02 deg, centre 0.68): a label is now and then wrong by six degrees [1]."""
 LIFT_RE, LIFT_SHAPE = (1e4, 3e4, 1e5, 3e5), (0.0, -1.0, 1.0, 0.0)
 """Mean lift that section tables do not know, linear in ln Re: laminar separation reattaches from 30,000 on and closes
 to a shorter bubble from 70,000 (Carmichael 1981, NASA CR 165803, not checked), while tables at n_crit 3 have most of
@@ -234,16 +231,6 @@ class Population:
             cov[np.ix_([_LIFT, _DRAG], [_LIFT, _DRAG])] += chord_sd(diameter_m) ** 2
         prior = Prior(mean, cov, sizes(self.nu), WEIGHTS.copy(), known_from)
         return prior.scaled(sds) if sds else prior
-
-    def widths(self, known_from: str, diameter_m: float, section: str = "rule") -> tuple[Array, Array]:
-        """Standard deviations at size 1, (K,), and degrees of freedom, (K,), of what is known of each latent number.
-
-        One answer for all that need widths of a blade; a mixture of `sizes` of those degrees by `WEIGHTS` is the law.
-        """
-        nu = np.full(len(NAMES), self.nu)
-        if known_from == "label":
-            nu[_ANGLE] = LABEL_NU
-        return self.prior(known_from, diameter_m, section=section).sd, nu
 
     def _amplitudes(self, at: Sensed) -> tuple[Array, Array]:
         """Standard deviations of remainder and of the part at rest, (..., 2, P) each [1]."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import permutations
 
@@ -223,8 +223,8 @@ def _claimed(p: _Pool) -> list[ScoreRow]:
     hidden = [j for j in p.told("single", "sensor", "underpowered") if not j.visible]
     with_cause = [j for j in p.of("single", "sensor", "pair", "underpowered") if j.claims]
     by_reference = (
-        ("with", [j for j in visible if _referenced(j)]),
-        ("without", [j for j in visible if not _referenced(j)]),
+        ("with", [j for j in visible if j.entry.referenced]),
+        ("without", [j for j in visible if not j.entry.referenced]),
     )
     return [
         _share("claims on nulls, noise", (j.claims for j in p.told("null")), "<= 2 %", 0.02, True),
@@ -269,11 +269,6 @@ def _numbers(p: _Pool, settled: Sequence[bool]) -> list[ScoreRow]:
         _share("right variable in the location", map(_located, where), ">= 90 %", 0.90),
         _share("recommended run settles the tie", settled, ">= 70 %", 0.70),
     ]  # fmt: skip
-
-
-def _referenced(j: Judged) -> bool:
-    """Whether the item came with a run without its cause."""
-    return bool(j.entry.referenced)
 
 
 def _with_reference(again: Sequence[Judged]) -> list[ScoreRow]:
@@ -383,9 +378,9 @@ def strata(judged: Sequence[Judged], edges: Sequence[float] = (0.0, 3.0, 5.0, 10
     return out
 
 
-def confusion(judged: Sequence[Judged], key: Callable[[Judged], str] | None = None) -> dict[str, dict[str, int]]:
+def confusion(judged: Sequence[Judged]) -> dict[str, dict[str, int]]:
     """How often what was there was called what."""
-    return _counted((key(j) if key else "+".join(j.entry.causes) or j.entry.set, j.said) for j in judged)
+    return _counted(("+".join(j.entry.causes) or j.entry.set, j.said) for j in judged)
 
 
 def _percent(value: float) -> str:

@@ -69,7 +69,6 @@ N_RADIAL = 11
 # Reynolds grid ln Re_0, 1/step, last node; Mach number grid 1/step of M^2, last node; strides of the tables along M^2,
 # Re and station; blade count; start of the Mach tables behind the station's others, where they are apart.
 N_GRID = 17
-N_PAR = N_NUM + N_GRID
 
 # Newton's last step, along which the state is carried [rad].
 TOL_OPEN = 1e-7
