@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 import shlex
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ import numpy as np
 from bemt.base import tables
 from bemt.base.averaging import Mean
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK
+from bemt.base.given import options_of
 from bemt.data.readers.cfd_run import KIND as RUN
 from bemt.data.recordings import cfd_run
 from bemt.data.recordings.cfd_setup import CfdRun
@@ -222,8 +223,8 @@ class Imported:
         told = self.complaints
         return EXIT_INTERNAL if any(text.startswith(INTERNAL) for text in told) else EXIT_INPUT if told else EXIT_OK
 
-    def text(self, wrote: str = "", said: str = "") -> str:
-        """For a terminal, with what to do next with recordings of a rotor, of which `said` states the units."""
+    def text(self, wrote: str = "", said: Mapping[str, Sequence[str | float]] = {}) -> str:  # noqa: B006
+        """For a terminal, with what to do next with recordings of a rotor, of which the options `said` were given."""
         own = {name for run in self.runs for name in run.files}
         shown = [f for f in self.files if f.format != RUN and f.error is None]
         lines = [f.title if f.path in own else f.text + "\n" for f in shown]
@@ -233,25 +234,35 @@ class Imported:
             steps = "\n".join(f"  ! {line}" for line in self.to_do.splitlines())
             lines.append(f"To use it as a CFD run, and --out run.toml to keep it:\n{steps}\n")
         if wrote or self.runs:
-            return "\n".join([*lines, self._next_with_a_run(wrote)])
-        return "\n".join([*lines, *self._next_with_recordings(f" {said}" if said else "")])
+            return "\n".join([*lines, self._next_with_a_run(wrote, {"case": said.get("case", ["CASE"])})])
+        return "\n".join([*lines, *self._next_with_recordings(said or {"case": ["CASE"]})])
 
-    def _next_with_a_run(self, wrote: str) -> str:
+    def _next_with_a_run(self, wrote: str, said: Mapping[str, Sequence[str | float]]) -> str:
         """What to do with a CFD run: in the file that was written, in one that was given, or in one to be written."""
         name = "" if wrote else self.runs[0].file
         usable = Path(name).is_file() and name.endswith(".toml")
         usable = usable or any(f.path == name and f.format == RUN for f in self.files)
         file = wrote or (name if usable else "study.toml" if self.runs[0].studies else "run.toml")
         lead = f"{wrote} written. " if wrote else "" if file == name else f"With --out {file}: "
-        return f"{lead}Next: bemt compare {shlex.quote(file)} --case CASE   (a case: bemt new 10x5)\n"
+        return f"{lead}Next: bemt compare {' '.join([shlex.quote(file), *options_of(said)])}{_a_case(said)}\n"
 
-    def _next_with_recordings(self, said: str) -> list[str]:
+    def _next_with_recordings(self, said: Mapping[str, Sequence[str | float]]) -> list[str]:
         """What to do with recordings of loads, if they have the speed."""
         read = [(f.path, f.record.kind, set(named(f.record).values)) for f in self.files if f.record]
-        loaded = [shlex.quote(path) for path, _, channels in read if "rpm" in channels and _LOADS & channels]
+        loaded = [
+            shlex.quote(path)
+            for path, _, channels in read
+            if ("rpm" in channels or "rpm" in said) and _LOADS & channels
+        ]
         if not loaded and any(_LOADS & channels for _, kind, channels in read if kind == "bench"):
             return ["Next: a column headed rpm, the speed of every row; no model can be set beside loads without it\n"]
         if not loaded:
             return []
-        step = f"Next: bemt diagnose {loaded[0]} --case CASE{said}   (a case: bemt new 10x5)\n"
-        return [step + (f"      bemt compare {loaded[0]} {loaded[1]}{said}\n" if len(loaded) == 2 else "")]
+        step = f"Next: {' '.join(['bemt diagnose', loaded[0], *options_of(said)])}{_a_case(said)}\n"
+        pair = options_of({k: v for k, v in said.items() if k in ("unit", "column", "sign")})
+        return [step + (f"      {' '.join(['bemt compare', *loaded, *pair])}\n" if len(loaded) == 2 else "")]
+
+
+def _a_case(said: Mapping[str, Sequence[str | float]]) -> str:
+    """How to make the case that a command has a word for."""
+    return "   (a case: bemt new 10x5)" if said["case"] == ["CASE"] else ""

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.physics import effects
+from bemt.physics.effects.unit_slip import UnitSlip
 
 if TYPE_CHECKING:
     from bemt.judge.diagnose.problem import Problem
@@ -141,6 +142,8 @@ def _candidate(problem: Problem, name: str, cls: type[Effect]) -> Candidate | No
             share = (
                 effect.odds() * float(np.prod([p.density(float(setting[k])) for k, p in sizes.items()])) / len(given)
             )
+            if isinstance(effect, UnitSlip):
+                share *= min(effect.fits(p.record.declared) for p in problem.parts)
             columns.append((dict(setting), problem.signature((effect,)), True, share))
     else:
         axes = [p for p in cls.parameters if p.steps > 0]

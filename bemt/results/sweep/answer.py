@@ -169,13 +169,15 @@ def _worst(found: Sequence[_Thrust]) -> list[str]:
 
 
 def _ducts(solved: Sequence[Result]) -> list[str]:
-    """Why K1/K2 is far off for a ducted fan."""
+    """What the duct carries, and why K1/K2 is far off for a ducted fan."""
     told = []
+    fans = [f"{100 * r.fan.duct_share:.0f} % on {r.name[:30]}" for r in solved if r.fan]
     for result in solved:
         own, simple = result.first("bemt"), result.first("k1k2")
         if result.kind == "fan" and own and simple and own.thrust_N > 0.0:
             told.append(f"{number_text(simple.thrust_N / own.thrust_N, 2)} of BEMT on {result.name[:30]}")
-    words = (
+    words = f"The duct's share of the thrust: {', '.join(fans[:3])}. " if fans else ""
+    words += (
         f"K1/K2 gives {', '.join(told[:3])}: it is a fit to open propellers with diameter and pitch only. It ignores "
         "the duct and the number of blades."
     )
