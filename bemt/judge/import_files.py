@@ -159,7 +159,7 @@ def import_(
         lines.append(f"{sentence}\n")
     if kept and not found.runs:
         lines.insert(0, f"{kept} written\n")
-    options = {"case": [str(case) if isinstance(case, str | os.PathLike) else "CASE"], **said}
+    options: dict[str, list[Any]] = {"case": [str(case) if isinstance(case, str | os.PathLike) else "CASE"], **said}
     text = "\n".join([*lines, found.text(wrote or (kept if found.runs else ""), options)])
     return Told(document, text, exit_code=found.exit_code, complaints=found.complaints)
 

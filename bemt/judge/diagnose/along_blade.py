@@ -192,12 +192,13 @@ def _condition(
     here = np.ones(n.size, dtype=bool) if speed is None else np.abs(n / speed - 1.0) < ONE
     here &= np.ones(n.size, dtype=bool) if wind is None else np.abs(v - wind) < np.maximum(0.02, ONE * abs(wind))
     one = here.any() and np.ptp(n[here]) < ONE * n[here].max() and np.ptp(v[here]) < max(0.02, ONE * v[here].max())
-    told = loads.rpm is None and rpm is not None and not here.any()  # nothing was recorded at what the options say
-    if n.size and not one and (speed is None or told):
-        got = f"slices {'without a speed' if speed is None else f'at --rpm {speed:g}'}, and {n.size} readings at "
-        got += f"{n.min():g} to {n.max():g} rev/min, {v.min():g} to {v.max():g} m/s"
-        hint = "A column rpm in the slices, or --rpm N" if speed is None else "Leave out the wrong one of the two"
-        raise InputError(Fault(path.as_posix(), "rpm", got, "the speed of the slices, one of the recorded", hint))
+    if n.size and speed is None and not one:
+        got = f"slices without a speed, and {n.size} readings at {n.min():g} to {n.max():g} rev/min"
+        got += f", {v.min():g} to {v.max():g} m/s"
+        raise InputError(Fault(path.as_posix(), "rpm", got, "the speed of the slices", "A column rpm, or --rpm N"))
+    if n.size and not here.any():
+        reach = " to ".join(dict.fromkeys(speed_text(float(x)) for x in (n.min(), n.max())))
+        whose += f"; nothing was recorded there: the readings are at {reach} rev/min"
     if not one:
         speed, whose = (case.rpm, "of the case") if speed is None else (speed, whose)
         return SliceCondition(speed, case.airspeed_m_s if wind is None else wind, loads.density, whose)

@@ -203,8 +203,8 @@ def diagnosed(
         "baseline": [baseline] * (baseline != "bemt"),
     })  # fmt: skip
     stated_of = {name: run[name] for name in ("unit", "column", "sign")}
-    asked = Given(*(tuple(map(shlex.quote, _named(*f))) for f in ((files, "RECORDING"), (known, "REFERENCE"))),
-                  " ".join(rest), tuple(ruled_out), tuple(changed), stated_of)  # fmt: skip
+    own, others = (tuple(map(shlex.quote, _named(*f))) for f in ((files, "RECORDING"), (known, "REFERENCE")))
+    asked = Given(own, others, " ".join(rest), tuple(ruled_out), tuple(changed), stated_of)
     heard = [CHANNELS[c] for c in channels] or None
     one = [v[0] if len(v) == 1 else None for v in (speeds, winds)]
     blade = {} if along is None else along_blade(cases[0], Path(path_text("along", along)), records, *one)
