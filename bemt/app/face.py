@@ -17,7 +17,7 @@ from typing import Any
 
 from bemt.app import registry
 from bemt.app.registry import complain, progress
-from bemt.base.action import Declaration, about, check_counts, check_picture, choices_of, did_you_mean
+from bemt.base.action import Declaration, about, check_counts, choices_of, did_you_mean
 from bemt.base.errors import EXIT_OK
 
 PROGRESS = "progress"
@@ -274,7 +274,6 @@ def run(function: Callable[..., Any], argv: Sequence[str], prog: str = "bemt") -
     given = values(function, args)
     check_folders(told.command, given)
     check_files({p.name for p in parameters(function) if p.kind == "text"}, given)
-    check_picture(given.get("picture"))
     inner = inspect.unwrap(function)  # the faults of the command line name options
     check_counts([p.name for p in parameters(function) if "Count" in str(inner.__annotations__[p.name])], given)
     with progress(args.quiet or args.json) as say, nothing_empty(given.get("out")):

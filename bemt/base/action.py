@@ -133,7 +133,6 @@ def worded(function: Callable[P, T]) -> Callable[P, T]:
             raise TypeError(f"{function.__name__}() got {unknown[0]!r}.{near}")
         given = dict(zip(names, args, strict=False)) | more
         check_counts(counts, given)
-        check_picture(given.get("picture"))
         check_choices(choices, given)
         with in_words_of_the_library():
             return function(*args, **more)
@@ -151,18 +150,6 @@ def check_counts(names: Iterable[str], given: dict[str, Any]) -> None:
             if not whole:
                 faults.append(Fault("", name, repr(one), "a whole number of 1 or more"))
     refuse(faults)
-
-
-def check_picture(path: Any) -> None:
-    """Refuse the name of a picture that no PNG has, before the work.
-
-    >>> check_picture("out.gif")
-    Traceback (most recent call last):
-        ...
-    bemt.base.errors.InputError: picture: got out.gif; expected a name that ends in .png.
-    """
-    if path is not None and Path(path).suffix.lower() != ".png":
-        raise InputError(Fault("", "picture", str(path), "a name that ends in .png"))
 
 
 def choices_of(kind: str) -> tuple[str, ...]:

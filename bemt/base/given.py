@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import shlex
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +12,7 @@ from bemt.base.arrays import Array
 from bemt.base.cache import cache_dir
 from bemt.base.errors import Fault, InputError
 
-__all__ = ["number", "numbers", "options_of", "path_text"]
+__all__ = ["number", "numbers", "path_text"]
 
 
 def numbers(name: str, value: Any, finite: bool = True) -> Array:
@@ -63,16 +61,6 @@ def paths_text(name: str, value: Any, least: int = 0) -> list[str]:
     if len(several) < least:
         raise InputError(Fault("", name, "none", "one or more"))
     return [path_text(name, one) for one in several]
-
-
-def options_of(told: Mapping[str, Sequence[str | float]]) -> list[str]:
-    """Words of options, of those that were told, quoted for a shell.
-
-    >>> options_of({"rpm": [6000.0], "only": [], "column": ["thrust=load cell"]})
-    ['--rpm', '6000', '--column', "'thrust=load cell'"]
-    """
-    words = {f"--{name}": [shlex.quote(v if isinstance(v, str) else f"{v:g}") for v in told[name]] for name in told}
-    return [word for option, values in words.items() if values for word in (option, *values)]
 
 
 # Where published data are found, and whether a name stays in its folder.

@@ -104,6 +104,8 @@ def import_(
 
     if picture is not None and case is None:
         raise InputError(Fault("--picture", "", "no case", "--case CASE, whose band is drawn"))
+    if picture is not None and Path(picture).suffix.lower() != ".png":
+        raise InputError(Fault("", "picture", str(picture), "a name that ends in .png"))
     names, wrote, kept = paths_text("files", files, 1), "", ""
     names = [f"{name}#{sheet}" for name in names] if sheet else names
     choice = asked(rpm, period_s, revolutions)
@@ -115,7 +117,7 @@ def import_(
     of_tables = {"airspeed_m_s": airspeed_m_s, "density_kg_m3": density_kg_m3}
     measured = not any(v for k, v in run.items() if k not in of_tables) and all(map(load.is_measured, names))
     conditions = {**of_tables, "rpm": rpm if measured else None}
-    said = {**told, **{k.replace("_", "-"): [v] for k, v in conditions.items() if v is not None}}
+    said: dict[str, list[Any]] = {**told, **{k.replace("_", "-"): [v] for k, v in conditions.items() if v is not None}}
     run = run | dict.fromkeys(of_tables) if measured else run
     lines, insist = [], any(told.values()) or any(run.values()) or bool(out is not None or pole_pairs)
     table = names[0] if len(names) == 1 and measured else ""
@@ -139,7 +141,8 @@ def import_(
         raise InputError(Fault("", "--pole-pairs", f"{pole_pairs} with these files", "one table of measurements"))
     if measured and not kept and any(v is not None for v in of_tables.values()):
         with suppress(InputError):  # said where it is read
-            stated |= {n: load.filled(stated.get(n) or load.import_file(n, format, choice), **of_tables) for n in names}
+            read = {n: stated.get(n) or load.import_file(n, format, choice) for n in names}
+            stated |= {n: cfd_options.filled(one, **of_tables) for n, one in read.items()}
     speed = None if choice.period is None else 60.0 / choice.period
     made = cfd_options.run_from(names, rpm=speed, revolutions=revolutions, **run, unit=told["unit"],
                                 column=told["column"], sign=told["sign"])  # fmt: skip

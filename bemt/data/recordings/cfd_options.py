@@ -6,9 +6,11 @@ import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from bemt.base import units
 from bemt.base.action import did_you_mean
@@ -20,13 +22,14 @@ from bemt.data import readers
 from bemt.data.readers import generic_csv, load_text, number
 from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import QUANTITIES, ReferenceTable, RunHead, RunToml, SetupTable, toml_text
-from bemt.data.readers.headings import counts_electrical, heading, meanings
+from bemt.data.readers.headings import counts_electrical, heading, meanings, surely_shaft_speed
 from bemt.data.readers.recording_toml import QUANTITIES as CHANNELS
 from bemt.data.readers.recording_toml import RecordingToml
 from bemt.data.readers.split import decimal_mark, some, split_table
 from bemt.data.readers.unit_text import TWO_MEANINGS, unit_for
 from bemt.data.recordings.cfd_loads import DUCT
 from bemt.data.recordings.channels import named
+from bemt.physics.dataset import Dataset
 
 Facts = dict[str, str | int]
 """What options say of one quantity: ``column``, ``unit``, ``sign``."""
@@ -435,3 +438,33 @@ def _facts(
     _gather("--unit", unit, headings.unit, columns, faults)
     _gather("--sign", sign, headings.sign, columns, faults)
     return columns
+
+
+def filled(
+    imported: Dataset, rpm: float | None = None, airspeed_m_s: float | None = None, density_kg_m3: float | None = None
+) -> Dataset:  # fmt: skip
+    """Recording with the speed, the airspeed and the density that the user states where it has no column of them."""
+    known = named(imported).values
+    told, notes = {}, []
+    if rpm is not None and "rpm" not in known:
+        for name, v in imported.values.items():
+            varies = not imported.unit(name) and np.unique(v[np.isfinite(v)]).size > 1
+            text = imported.headings.get(name) or name
+            if varies and surely_shaft_speed(text):
+                got = f"--rpm {rpm:g}, and a column of {np.unique(v).size} speeds without a unit"
+                hint = f"Head it {text} (rev/min) or {text} (rad/s), and leave out --rpm"
+                raise InputError(Fault(imported.file, text, got, "one source of the speed", hint))
+    moist = ("pressure_Pa",) if "temperature_K" in known else ()
+    for name, value, same in (
+        ("rpm", rpm, ("rpm",)), ("airspeed_m_s", airspeed_m_s, ("airspeed_m_s", "J")),
+        ("density_kg_m3", density_kg_m3, ("density_kg_m3", *moist)),
+    ):  # fmt: skip
+        if value is None:
+            continue
+        own = next((k for k in same if k in known), None)
+        if own is None:
+            told[name] = np.full(len(imported), float(value))
+        notes.append(f"{name}: {value:g} as given" if own is None else f"{name}: ignored, the file has {own}")
+    values = {**imported.values, **told}
+    units = {k: unit for k, unit in imported.units.items() if k not in told}
+    return replace(imported, values=values, units=units, notes=(*imported.notes, *notes)) if notes else imported

@@ -24,7 +24,6 @@ import numpy as np
 from bemt.base import tables
 from bemt.base.averaging import Mean
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK
-from bemt.base.given import options_of
 from bemt.data.readers.cfd_run import KIND as RUN
 from bemt.data.recordings import cfd_run
 from bemt.data.recordings.cfd_setup import CfdRun
@@ -43,6 +42,16 @@ SHOWN = ("run", "pwm_s", "throttle", "rpm", "airspeed_m_s", "J", "thrust_N", "to
 _ROWS = 20  # channels on one screen
 MOST = 40
 """Points shown; JSON has all."""
+
+
+def options_of(told: Mapping[str, Sequence[str | float]]) -> list[str]:
+    """Words of options, of those that were told, quoted for a shell.
+
+    >>> options_of({"rpm": [6000.0], "only": [], "column": ["thrust=load cell"]})
+    ['--rpm', '6000', '--column', "'thrust=load cell'"]
+    """
+    words = {f"--{name}": [shlex.quote(v if isinstance(v, str) else f"{v:g}") for v in told[name]] for name in told}
+    return [word for option, values in words.items() if values for word in (option, *values)]
 
 
 def reduction_document(reduced: Dataset | str | None) -> dict[str, Any] | None:
@@ -249,11 +258,7 @@ class Imported:
     def _next_with_recordings(self, said: Mapping[str, Sequence[str | float]]) -> list[str]:
         """What to do with recordings of loads, if they have the speed."""
         read = [(f.path, f.record.kind, set(named(f.record).values)) for f in self.files if f.record]
-        loaded = [
-            shlex.quote(path)
-            for path, _, channels in read
-            if ("rpm" in channels or "rpm" in said) and _LOADS & channels
-        ]
+        loaded = [shlex.quote(p) for p, _, known in read if _LOADS & known and "rpm" in {*known, *said}]
         if not loaded and any(_LOADS & channels for _, kind, channels in read if kind == "bench"):
             return ["Next: a column headed rpm, the speed of every row; no model can be set beside loads without it\n"]
         if not loaded:

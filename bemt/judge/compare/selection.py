@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError, refuse
-from bemt.base.given import options_of
 from bemt.base.units import KNOT, MPH, RPM, ZERO_CELSIUS, split_suffix
 from bemt.data.readers.headings import counts_electrical, may_be_shaft_speed, surely_shaft_speed
 from bemt.data.recordings.channels import MEASURED, in_one_step, moves, named
 from bemt.data.recordings.findings import zero_thrust_speed
+from bemt.data.recordings.shown import options_of
 from bemt.physics.air import AIR_C, Air
 from bemt.physics.dataset import Dataset
 

@@ -65,9 +65,10 @@ def load(
     airspeed_m_s: float | None = None, density_kg_m3: float | None = None,
 ) -> Record:  # fmt: skip
     """Read one recording, whatever its format."""
+    from bemt.data.recordings.cfd_options import filled
     from bemt.data.recordings.cfd_run import is_run, run_at
     from bemt.data.recordings.cfd_setup import one_grid
-    from bemt.data.recordings.load import filled, import_file
+    from bemt.data.recordings.load import import_file
     from bemt.data.recordings.reduce import reduce, reduction
 
     if imported is None:

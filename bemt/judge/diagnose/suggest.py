@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.gaussian.whitening import whitener
-from bemt.base.given import options_of
 from bemt.base.units import ZERO_CELSIUS, suffixes
 from bemt.data.readers.recording_toml import QUANTITIES
+from bemt.data.recordings.shown import options_of
 from bemt.judge.compare.change_document import AIR_OF_BOTH, DAYS
 from bemt.judge.diagnose import noise
 from bemt.judge.diagnose.assemble import assemble
@@ -24,11 +24,10 @@ from bemt.judge.diagnose.nuisance import PRIORS
 from bemt.judge.diagnose.problem import Part, Problem
 from bemt.judge.diagnose.record import Record
 from bemt.judge.diagnose.repeats import conditions
-from bemt.judge.diagnose.signatures import effect_of
+from bemt.judge.diagnose.signatures import actual_unit, effect_of
 from bemt.physics import effects
 from bemt.physics.air import R_DRY
 from bemt.physics.bem import model as bem
-from bemt.physics.effects.unit_slip import UnitSlip
 from bemt.rotors.model import air_of_points
 
 if TYPE_CHECKING:
@@ -449,10 +448,11 @@ def _restated(found: Mapping[str, Any], record: Record) -> tuple[str, ...]:
     """
     channel = str(found.get("channel", ""))
     quantity = next((q for q, d in QUANTITIES.items() if channel in (q, f"{q}_{suffixes(d)[0]}")), "")
-    slip = effect_of("unit_slip", found) if quantity and "unit" in found else None
-    unit = slip.actual(record.declared.get(channel, 1.0)) if isinstance(slip, UnitSlip) else ""
-    if isinstance(slip, UnitSlip) and slip.factor < 0.0:
+    if not quantity or "unit" not in found:
+        return ()
+    if found["factor"] < 0.0:
         return "sign", f"{quantity}=-1"
+    unit = actual_unit(channel, float(found["factor"]), record.declared)
     return ("unit", f"{quantity}={unit}") if unit else ()
 
 

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 
 from bemt.base import unit_errors
-from bemt.base.units import RPM, UNITS
 from bemt.physics.effects.base import Effect, Flow, Parameter, Reading, choice
 
 _SIGNED = ("thrust_N", "torque_Nm", "airspeed_m_s")
 _KINDS = {"thrust_N": "force", "torque_Nm": "torque", "rpm": "rotation", "airspeed_m_s": "airspeed",
           "density_kg_m3": "density"}  # fmt: skip
-_DIMENSIONS = _KINDS | {"rpm": "angular_speed", "airspeed_m_s": "speed"}
 CHANNELS = tuple(_KINDS)
-_CONVERTED = math.exp(-2.0)  # Share of numbers that were converted wrongly before they were headed: declared [1]
 _KGF = unit_errors.named("kgf", "N")
 _Setting = dict[str, str | float]
 
@@ -85,18 +81,3 @@ class UnitSlip(Effect):
     def odds(self) -> float:
         """Relative frequency of the error."""
         return _settings().get((self.channel, self.factor), ({}, 1.0))[1]
-
-    def actual(self, declared: float = 1.0) -> str:
-        """Unit of the numbers under a heading whose unit is `declared` [N, N m, rev/min, m/s, kg/m3]; "" for none.
-
-        >>> UnitSlip("airspeed_m_s", 1.0 / 3.6).actual(1.0 / 3.6), UnitSlip("airspeed_m_s", 0.3048).actual(1.0 / 3.6)
-        ('m_s', '')
-        """
-        size = declared / self.factor * (RPM if self.channel == "rpm" else 1.0)
-        alike = (u for u in UNITS.values() if u.dimension == _DIMENSIONS[self.channel])
-        return next((u.suffix for u in alike if math.isclose(size, u.factor, rel_tol=1e-6)), "")
-
-    def fits(self, declared: Mapping[str, float]) -> float:
-        """Share that is left of its odds beside the units of headings, by channel; all of it where they are SI. [1]"""
-        unit = declared.get(self.channel, 1.0)
-        return 1.0 if unit == 1.0 or self.factor < 0.0 or self.actual(unit) else _CONVERTED
