@@ -171,6 +171,7 @@ def test_slices_are_compared_at_the_speed_of_the_recording(tmp_path: Path) -> No
     assert np.allclose(told["thrust_ratio"], 1.0, atol=0.01)
     (told,) = bemt.diagnose(run, case, along=path, rpm=6500).to_dict()["along_blade"].values()
     assert "at 6500 rev/min" in told["state"] and min(told["thrust_ratio"]) > 1.1
+    assert "readings are at 6000 rev/min" in told["state"]  # two speeds: both are said
     one = slices(tmp_path, "one.csv", "r [mm],dT/dr [N/m],dQ/dr [N m/m]", 1e3, (made[0], made[1] / 2, made[2] / 2))
     (told,) = bemt.diagnose(run, case, along=one).to_dict()["along_blade"].values()
     assert "are they of all blades" in told["whole"] and not told["named"]

@@ -36,8 +36,8 @@ def diagnose(
     reference: Recording | Sequence[Recording] | None = None, reference_case: Propeller | Path | None = None,
     only: Sequence[str] = (), ruled_out: Sequence[str] = (), changed: Sequence[str] = (), off: Sequence[str] = (),
     baseline: Literal["bemt", "k1k2"] = "bemt", channels: Sequence[Literal["thrust", "torque", "speed"]] = (),
-    rpm: ArrayLike = (), airspeed_m_s: ArrayLike = (), repeatability_pct: float | None = None,
-    top_rpm: float | None = None,
+    rpm: ArrayLike = (), airspeed_m_s: ArrayLike = (), density_kg_m3: ArrayLike = (),
+    repeatability_pct: float | None = None, top_rpm: float | None = None,
     unit: Mapping[str, str] = {}, column: Mapping[str, str] = {}, sign: Mapping[str, str] = {},  # noqa: B006
     zones: Sequence[str] = (), along: Path | None = None, out: Path | None = None, figures: bool = True,
     progress: Callable[[str], None] | None = None,
@@ -70,6 +70,8 @@ def diagnose(
         Speed for files without one: one for all, or one per file. [rev/min]
     airspeed_m_s : array_like
         Airspeed for files without one: one for all, or one per file; from the case by default. [m/s]
+    density_kg_m3 : array_like
+        Density of the air for files that record none, the same way; from the case by default. [kg/m3]
     repeatability_pct : float, optional
         What runs of this stand differ by, standard deviation; 0.2 to 2, from the readings, by default. [%]
     top_rpm : float, optional
@@ -113,7 +115,7 @@ def diagnose(
 
     return diagnosed(
         recordings, case, reference, reference_case, only=only, ruled_out=ruled_out, changed=changed, off=off,
-        baseline=baseline, channels=channels, rpm=rpm, airspeed_m_s=airspeed_m_s,
+        baseline=baseline, channels=channels, rpm=rpm, airspeed_m_s=airspeed_m_s, density_kg_m3=density_kg_m3,
         repeatability_pct=repeatability_pct, top_rpm=top_rpm, along=along, out=out, figures=figures, progress=progress,
         run={"unit": words(unit), "column": words(column), "sign": words(sign), "zones": list(zones)},
     )  # fmt: skip
@@ -122,6 +124,7 @@ def diagnose(
 @action(
     "Recordings", "compare monday.csv tuesday.csv --case cases/prop_8x5", words=("a", "b"), shown=True,
     common=("case", "label", "rows_a", "rows_b", "air_a", "air_b", "out"),
+    elsewhere=dict.fromkeys(("--density-kg-m3", "--airspeed-m-s"), "Each run has its own: --air-a 1.19kg/m3,5m/s."),
 )  # fmt: skip
 def compare(
     a: Recording, b: Recording | None = None, *, case: Propeller | Path | None = None, label: str | None = None,

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-import shlex
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -107,6 +107,8 @@ def import_(
 
     if picture is not None and case is None:
         raise InputError(Fault("--picture", "", "no case", "--case CASE, whose band is drawn"))
+    if picture is not None and Path(picture).suffix.lower() != ".png":
+        raise InputError(Fault("", "picture", str(picture), "a name that ends in .png"))
     names, wrote, kept = paths_text("files", files, 1), "", ""
     names = [f"{name}#{sheet}" for name in names] if sheet else names
     choice = asked(rpm, period_s, revolutions)
@@ -116,25 +118,35 @@ def import_(
            "density_kg_m3": density_kg_m3, "reference": words(reference), "setup": words(setup)}  # fmt: skip
     left = [os.fspath(heading) for heading in ([ignore] if isinstance(ignore, str) else ignore)]
     stated: dict[str, Any] = {}
-    said = ""
+    of_tables = {"airspeed_m_s": airspeed_m_s, "density_kg_m3": density_kg_m3}
+    measured = not any(v for k, v in run.items() if k not in of_tables) and all(map(load.is_measured, names))
+    conditions = {**of_tables, "rpm": rpm if measured else None}
+    said: dict[str, list[Any]] = {**told, **{k.replace("_", "-"): [v] for k, v in conditions.items() if v is not None}}
+    run = run | dict.fromkeys(of_tables) if measured else run
     lines, insist = [], any((*told.values(), *run.values(), left, out is not None, pole_pairs))
-    table = names[0] if len(names) == 1 and not any(run.values()) and load.is_measured(names[0]) else ""
+    table = names[0] if len(names) == 1 and measured else ""
     if insist and table and (out is not None or pole_pairs or left):
         from bemt.data.recordings.cfd_options import write_recording
 
         if out is None:  # no command takes these two: a file keeps them
             hint = f"Add --out {Path(table).with_name('recording.toml').as_posix()}"
             raise InputError(Fault("", "--out", "nothing", "a recording.toml that keeps what you state", hint))
-        facts = told["unit"], told["column"], told["sign"], pole_pairs
+        if airspeed_m_s is not None:
+            hint = "Head a column airspeed_m_s, or give it to the command that takes the file"
+            raise InputError(Fault("", "--airspeed-m-s", f"{airspeed_m_s:g} with --out", "no airspeed", hint))
+        facts = told["unit"], told["column"], told["sign"], pole_pairs, density_kg_m3
         written = write_recording(table, os.fspath(out), *facts, ignore=left).as_posix()
-        kept = written
+        kept, said = written, {}
         names, told, out, left, insist = [written], dict.fromkeys(told, []), None, [], False
-    elif insist and table:
-        stated = {table: load.as_stated([table], told)[0]}
-        said = " ".join(shlex.join([f"--{name}", *given]) for name, given in told.items() if given)
+    elif insist and measured and out is None and not (pole_pairs or left):
+        stated = dict(zip(names, load.as_stated(names, told), strict=True))
         told, insist = dict.fromkeys(told, []), False
     elif pole_pairs:
         raise InputError(Fault("", "--pole-pairs", f"{pole_pairs} with these files", "one table of measurements"))
+    if measured and not kept and any(v is not None for v in of_tables.values()):
+        with suppress(InputError):  # said where it is read
+            read = {n: stated.get(n) or load.import_file(n, format, choice) for n in names}
+            stated |= {n: cfd_options.filled(one, **of_tables) for n, one in read.items()}
     speed = None if choice.period is None else 60.0 / choice.period
     made = cfd_options.run_from(names, rpm=speed, revolutions=revolutions, **run, unit=told["unit"],
                                 column=told["column"], sign=told["sign"], ignore=left)  # fmt: skip
@@ -149,11 +161,13 @@ def import_(
         others = [f.path for f in found.files if f.record is None or f.record.kind != "cfd"] if runs else names
         rest = [stated.get(name, name) for name in others]
         seen = [wrote] if wrote else [*runs, *rest]
-        sentence, document["prediction"] = _beside(seen, case, picture, rpm, airspeed_m_s, bool(wrote or runs))
+        wind = None if measured else airspeed_m_s
+        sentence, document["prediction"] = _beside(seen, case, picture, rpm, wind, bool(wrote or runs))
         lines.append(f"{sentence}\n")
     if kept and not found.runs:
         lines.insert(0, f"{kept} written\n")
-    text = "\n".join([*lines, found.text(wrote or (kept if found.runs else ""), said)])
+    options: dict[str, list[Any]] = {"case": [str(case) if isinstance(case, str | os.PathLike) else "CASE"], **said}
+    text = "\n".join([*lines, found.text(wrote or (kept if found.runs else ""), options)])
     return Told(document, text, exit_code=found.exit_code, complaints=found.complaints)
 
 

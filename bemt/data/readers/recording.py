@@ -71,6 +71,7 @@ class Builder:
     warnings: list[str] = field(default_factory=list)
     flags: dict[int, list[str]] = field(default_factory=dict)
     headings: dict[str, str] = field(default_factory=dict)
+    declared: dict[str, float] = field(default_factory=dict)  # Units of what was converted, in that of the channel
     faults: list[Fault] = field(default_factory=list)
     unitless: list[str] = field(default_factory=list)
     empty: list[str] = field(default_factory=list)
@@ -132,6 +133,7 @@ class Builder:
         """Give a channel another name, in its place; gives its heading."""
         self.channels = {new if k == old else k: c for k, c in self.channels.items()}
         self.headings[new] = self.headings.pop(old)
+        self.declared = {new if k == old else k: size for k, size in self.declared.items()}
         return self.headings[new]
 
     def line(self, row: int) -> int:
@@ -203,6 +205,7 @@ class Builder:
         elif head.unit.suffix != "rpm" and (head.unit.factor, head.unit.offset) != (1.0, 0.0):
             with np.errstate(over="ignore"):
                 values = values * head.unit.factor + head.unit.offset
+            self.declared[name] = head.unit.factor
             over = np.isinf(values)
             self.flag(np.flatnonzero(over), f"{name}: too large a number", "; NaN there")
             values[over] = np.nan
@@ -346,7 +349,7 @@ class Builder:
             step = f"bemt import {shlex.quote(file.as_posix())} {' '.join(asks)} --out {out}"
             own = [f"your {what} in place of {mark}" for mark, what in _OWN.items() if mark in step]
             self.warnings.append(f"in one step, with {' and '.join(own)}: {step}" if own else step)
-        said = {**self.table.source.about, **(provenance or {})}
+        said = {**self.table.source.about, "declared": self.declared, **(provenance or {})}
         flags: list[tuple[str, ...]] = [()] * len(self.table) if self.flags else []
         for row, words in self.flags.items():
             flags[row] = tuple(words)

@@ -19,6 +19,8 @@ from bemt.data.readers.split import SplitTable, decimal_mark, split_table
 from bemt.data.readers.unit_text import splits, unit_for
 
 EXPECTED = "r_over_R, chord_over_R and beta_deg; r and chord may be lengths, such as r_mm"
+LEAST_REACH, USUAL_WIDTH = 0.75, 0.08
+"""Radius of the outermost station, and largest chord that a blade hardly goes below, over the tip radius [1]."""
 WIDEST = 0.8
 """Largest chord over the tip radius that a blade has: that of the Kaplan propeller Ka 4-70 is 0.78 [1]."""
 _HEADS: dict[str, tuple[set[str], set[str]]] = {  # column: its own words, words that change nothing
@@ -203,16 +205,32 @@ def _thickness(table: SplitTable, columns: Sequence[_Column], decimal: str) -> t
     return None, [f"column {c.heading!r} not used: {why}" for c in columns]
 
 
+def _other_unit(place: _Column, value: float, low: float, high: float, R: float) -> str:
+    """Units of a column, or of the diameter, that bring a share of the tip radius between two bounds, as questions."""
+    size, D, length = place.scale * R, 2e3 * R, {u: units.UNITS[u].factor for u in ("mm", "cm", "in", "m")}
+    said = [f"Numbers in {u} under {place.heading}?" for u, f in length.items() if low <= value * f / size <= high]
+    for u, f in length.items():
+        if u != "mm" and low <= value * 1e-3 / f <= high:
+            option = f"--diameter-in {D:g}" if u == "in" else f"--diameter-mm {1e3 * f * D:g}"
+            said.append(f"A diameter of {D:g} mm? {D:g} {u} is {option}")
+    return " ".join(said[:2]) or f"Is the tip radius {1e3 * R:g} mm?"
+
+
 def _limits(source: SourceText, places: list[_Column], columns: tuple[Array, Array, Array], R: float) -> None:
     """What no blade has, each with the likely reason."""
     x, c, beta = columns
     is_length = not places[0].share
-    limits = ((x.max(), 0.75 if is_length else 0.0, 1.001), (c.max(), 0.0, WIDEST), (np.abs(beta).max(), 0.0, 90.0))
-    small = f"A diameter of {2e3 * R:g} mm? {2e3 * R:g} in is --diameter-in {2e3 * R:g}"
-    radius = f"Is the tip radius {1e3 * R:g} mm?" if is_length else "Divide the radius by the tip radius"
-    in_inches = not (is_length or places[1].share) and c.max() * 1e-3 / units.INCH <= WIDEST
-    chord = "Divide the chord by the tip radius; one over the diameter is chord_over_D" if places[1].share else radius
-    chord = small if in_inches else chord
+    limits = (
+        (x.max(), LEAST_REACH if is_length else 0.0, 1.001),
+        (c.max(), 0.0, WIDEST),
+        (np.abs(beta).max(), 0.0, 90.0),
+    )
+    radius = (
+        _other_unit(places[0], x.max(), LEAST_REACH, 1.001, R) if is_length else "Divide the radius by the tip radius"
+    )
+    chord = "Divide the chord by the tip radius; one over the diameter is chord_over_D"
+    if not places[1].share:
+        chord = radius if is_length else _other_unit(places[1], c.max(), USUAL_WIDTH, WIDEST, R)
     hints = (radius, chord if c.max() > WIDEST else "", "")
     for place, (value, low, high), hint in zip(places, limits, hints, strict=True):
         if not low <= value <= high:

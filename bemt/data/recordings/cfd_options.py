@@ -6,9 +6,11 @@ import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from bemt.base import units
 from bemt.base.action import did_you_mean
@@ -20,7 +22,7 @@ from bemt.data import readers
 from bemt.data.readers import generic_csv, load_text, number
 from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import QUANTITIES, ReferenceTable, RunHead, RunToml, SetupTable, toml_text
-from bemt.data.readers.headings import counts_electrical, heading, meanings
+from bemt.data.readers.headings import counts_electrical, heading, meanings, surely_shaft_speed
 from bemt.data.readers.recording_toml import QUANTITIES as CHANNELS
 from bemt.data.readers.recording_toml import RecordingToml
 from bemt.data.readers.split import decimal_mark, some, split_table
@@ -368,13 +370,13 @@ def _read_as(file: str) -> dict[str, str]:
 
 def write_recording(
     file: str, out: str, unit: Iterable[str] = (), column: Iterable[str] = (), sign: Sequence[str] = (),
-    pole_pairs: int | None = None, ignore: Sequence[str] = (),
+    pole_pairs: int | None = None, density_kg_m3: float | None = None, ignore: Sequence[str] = (),
 ) -> Path:  # fmt: skip
     """Write a recording.toml beside a table of measurements, in the same folder; all faults of the options at once.
 
     `unit` ``NAME=UNIT``, of a quantity or a heading; `column` ``QUANTITY=HEADING``; `sign` ``QUANTITY=-1``;
-    `pole_pairs` of a speed that counts electrical revolutions; `ignore` headings. InputError on what is no column, unit
-    or quantity, and where `out` exists.
+    `pole_pairs` of a speed that counts electrical revolutions; density of the air; `ignore` headings. InputError on
+    what is no column, unit or quantity, and where `out` exists.
     """
     import tomlkit
 
@@ -384,7 +386,7 @@ def write_recording(
         faults.append(Fault("", "--out", out, f"a file in the folder of {Path(file).name}", "Both stay together"))
     if path.exists():
         faults.append(Fault(path.as_posix(), "", "a file that exists", "a new name", "Add the lines to it by hand"))
-    document = recording_from(file, unit, column, sign, pole_pairs, faults, ignore)
+    document = recording_from(file, unit, column, sign, pole_pairs, density_kg_m3, faults, ignore)
     inline = {name: tomlkit.inline_table() for name in document["columns"]}
     for name, facts in document["columns"].items():
         inline[name].update(facts)
@@ -395,7 +397,8 @@ def write_recording(
 
 def recording_from(
     file: str, unit: Iterable[str] = (), column: Iterable[str] = (), sign: Sequence[str] = (),
-    pole_pairs: int | None = None, faults: Sequence[Fault] = (), ignore: Sequence[str] = (),
+    pole_pairs: int | None = None, density_kg_m3: float | None = None, faults: Sequence[Fault] = (),
+    ignore: Sequence[str] = (),
 ) -> dict[str, Any]:  # fmt: skip
     """Tables of a recording.toml from what options say of a table of measurements; their faults come after `faults`."""
     faults = list(faults)
@@ -419,6 +422,7 @@ def recording_from(
     head |= {"ignore": list(ignore)} if ignore else {}
     out = Collector(file)
     document = {"recording": head, "columns": columns} | ({"rotor": {"pole_pairs": pole_pairs}} if pole_pairs else {})
+    document |= {} if density_kg_m3 is None else {"air": {"density_kg_m3": density_kg_m3}}
     validated(RecordingToml, document, out)
     out.check()
     return document
@@ -461,3 +465,35 @@ def _facts(
     _gather("--unit", unit, headings.unit, columns, faults)
     _gather("--sign", sign, headings.sign, columns, faults)
     return columns
+
+
+def filled(
+    imported: Dataset, rpm: float | None = None, airspeed_m_s: float | None = None, density_kg_m3: float | None = None
+) -> Dataset:  # fmt: skip
+    """Recording with the speed, the airspeed and the density that the user states where it has no column of them."""
+    known = named(imported).values
+    told, notes = {}, []
+    if rpm is not None and "rpm" not in known:
+        for name, v in imported.values.items():
+            varies = not imported.unit(name) and np.unique(v[np.isfinite(v)]).size > 1
+            text = imported.headings.get(name) or name
+            if varies and surely_shaft_speed(text):
+                got = f"--rpm {rpm:g}, and a column of {np.unique(v).size} speeds without a unit"
+                hint = f"Head it {text} (rev/min) or {text} (rad/s), and leave out --rpm"
+                raise InputError(Fault(imported.file, text, got, "one source of the speed", hint))
+    moist = ("pressure_Pa",) if "temperature_K" in known else ()
+    for name, value, same in (
+        ("rpm", rpm, ("rpm",)), ("airspeed_m_s", airspeed_m_s, ("airspeed_m_s", "J")),
+        ("density_kg_m3", density_kg_m3, ("density_kg_m3", *moist)),
+    ):  # fmt: skip
+        if value is None:
+            continue
+        own = next((k for k in same if k in known), None)
+        if f"{name}: {value:g} as given" in imported.notes:
+            continue
+        if own is None:
+            told[name] = np.full(len(imported), float(value))
+        notes.append(f"{name}: {value:g} as given" if own is None else f"{name}: ignored, the file has {own}")
+    values = {**imported.values, **told}
+    units = {k: unit for k, unit in imported.units.items() if k not in told}
+    return replace(imported, values=values, units=units, notes=(*imported.notes, *notes)) if notes else imported

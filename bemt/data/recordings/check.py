@@ -7,13 +7,17 @@ slips of units (:mod:`bemt.data.recordings.slips`); columns, signs and physical 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from bemt.data.recordings import columns, slips  # they register themselves
+from bemt.data.recordings.channels import file_name, named
 from bemt.data.recordings.findings import CHECKS, SEVERITIES, Finding, facts_of
 from bemt.physics.dataset import Dataset
 
-__all__ = ["Finding", "check"]
+__all__ = ["Finding", "check", "left_out"]
 
 _ROOMS = (slips, columns)
 
@@ -35,3 +39,21 @@ def check(
     checks = (run for name, run in CHECKS.items() if (source.kind, name) != ("cfd", "constant"))
     found = [finding for run in checks for finding in run(facts)]
     return tuple(sorted(found, key=lambda f: SEVERITIES.index(f.severity)))
+
+
+def left_out(source: Dataset, findings: Sequence[Finding]) -> Dataset:
+    """The recording without the readings that its checks leave out; a row whose airspeed stuck is no row.
+
+    >>> made = Dataset("bench", "table", {"rpm": [4e3, 5e3], "airspeed_m_s": [8.0, 8.0]}, lines=(2, 3))
+    >>> left_out(made, [Finding("stuck_sensor", "airspeed_m_s", "", "", (1,), "warning")]).lines
+    (2,)
+    """
+    values, keep = {**source.values}, np.ones(len(source), dtype=bool)
+    airspeed = file_name(named(source), "airspeed_m_s")
+    for f in findings:
+        if f.id in ("misread", "stuck_sensor"):
+            values[f.channel] = np.array(values[f.channel])
+            values[f.channel][list(f.rows)] = np.nan
+            keep[list(f.rows)] &= f.channel != airspeed
+    found = replace(source, values=values)
+    return found if keep.all() else found.select(keep)

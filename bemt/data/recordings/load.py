@@ -22,7 +22,6 @@ from bemt.base.errors import Fault, InputError, system_fault
 from bemt.data import readers as importers
 from bemt.data.readers.cfd_run import KIND as RUN
 from bemt.data.readers.cfd_run import RunHead, RunToml
-from bemt.data.readers.headings import surely_shaft_speed
 from bemt.data.readers.split import some
 from bemt.data.readers.uiuc_tables import NO_SPEED
 from bemt.data.recordings import cfd_run
@@ -38,7 +37,6 @@ from bemt.data.recordings.adapt import (
 )
 from bemt.data.recordings.cfd_files import EXPORT, FIELDS, PROGRAMS, cfd_files, clock_of
 from bemt.data.recordings.cfd_loads import other_than_loads
-from bemt.data.recordings.channels import named
 from bemt.data.recordings.grid_study import merged, of_table
 from bemt.data.recordings.reduce import reduction
 from bemt.data.recordings.shown import INTERNAL, Imported, ImportedFile
@@ -222,32 +220,6 @@ def as_stated(files: Sequence[Any], run: Mapping[str, Any]) -> list[Any]:
     return list(runs_of(files, run_from(list(files), **run), insist=True)[0])
 
 
-def filled(imported: Dataset, rpm: float | None, airspeed_m_s: float | None) -> Dataset:
-    """Recording with the speed and the airspeed that the user states where it has no column of them."""
-    known = named(imported).values
-    told, notes = {}, []
-    if rpm is not None and "rpm" not in known:
-        for name, v in imported.values.items():
-            varies = not imported.unit(name) and np.unique(v[np.isfinite(v)]).size > 1
-            heading = imported.headings.get(name) or name
-            if varies and surely_shaft_speed(heading):
-                got = f"--rpm {rpm:g}, and a column of {np.unique(v).size} speeds without a unit"
-                hint = f"Head it {heading} (rev/min) or {heading} (rad/s), and leave out --rpm"
-                raise InputError(Fault(imported.file, heading, got, "one source of the speed", hint))
-    for name, value, same in (("rpm", rpm, ("rpm",)), ("airspeed_m_s", airspeed_m_s, ("airspeed_m_s", "J"))):
-        if value is None:
-            continue
-        own = next((k for k in same if k in known), None)
-        if f"{name}: {value:g} as given" in imported.notes:
-            continue
-        if own is None:
-            told[name] = np.full(len(imported), float(value))
-        notes.append(f"{name}: {value:g} as given" if own is None else f"{name}: ignored, the file has {own}")
-    values = {**imported.values, **told}
-    units = {k: unit for k, unit in imported.units.items() if k not in told}
-    return replace(imported, values=values, units=units, notes=(*imported.notes, *notes)) if notes else imported
-
-
 def is_measured(file: Any) -> bool:
     """Whether a file is a table of measurements, of whose columns units, headings and signs may be stated."""
     if not isinstance(file, str) or Path(file).is_dir():
@@ -264,14 +236,14 @@ def _stated(
 ) -> Dataset:  # fmt: skip
     """A table of measurements as a recording.toml with these facts would read it."""
     from bemt.data.readers.recording_toml import RecordingToml, joined
-    from bemt.data.recordings.cfd_options import recording_from
+    from bemt.data.recordings.cfd_options import filled, recording_from
 
     if unit or column or sign:
         made = RecordingToml.model_validate(recording_from(file, unit, column, sign))
         record = _finished(joined(made, Path(file).parent, file), Choice())
     else:
         record = import_file(file)
-    record = filled(record, rpm, None)
+    record = filled(record, rpm)
     return replace(record, provenance={**record.provenance, "stated": file})
 
 

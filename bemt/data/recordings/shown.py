@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 import shlex
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -42,6 +42,16 @@ SHOWN = ("run", "pwm_s", "throttle", "rpm", "airspeed_m_s", "J", "thrust_N", "to
 _ROWS = 20  # channels on one screen
 MOST = 40
 """Points shown; JSON has all."""
+
+
+def options_of(told: Mapping[str, Sequence[str | float]]) -> list[str]:
+    """Words of options, of those that were told, quoted for a shell.
+
+    >>> options_of({"rpm": [6000.0], "only": [], "column": ["thrust=load cell"]})
+    ['--rpm', '6000', '--column', "'thrust=load cell'"]
+    """
+    words = {f"--{name}": [shlex.quote(v if isinstance(v, str) else f"{v:g}") for v in told[name]] for name in told}
+    return [word for option, values in words.items() if values for word in (option, *values)]
 
 
 def reduction_document(reduced: Dataset | str | None) -> dict[str, Any] | None:
@@ -222,8 +232,8 @@ class Imported:
         told = self.complaints
         return EXIT_INTERNAL if any(text.startswith(INTERNAL) for text in told) else EXIT_INPUT if told else EXIT_OK
 
-    def text(self, wrote: str = "", said: str = "") -> str:
-        """For a terminal, with what to do next with recordings of a rotor, of which `said` states the units."""
+    def text(self, wrote: str = "", said: Mapping[str, Sequence[str | float]] = {}) -> str:  # noqa: B006
+        """For a terminal, with what to do next with recordings of a rotor, of which the options `said` were given."""
         own = {name for run in self.runs for name in run.files}
         shown = [f for f in self.files if f.format != RUN and f.error is None]
         lines = [f.title if f.path in own else f.text + "\n" for f in shown]
@@ -233,25 +243,31 @@ class Imported:
             steps = "\n".join(f"  ! {line}" for line in self.to_do.splitlines())
             lines.append(f"To use it as a CFD run, and --out run.toml to keep it:\n{steps}\n")
         if wrote or self.runs:
-            return "\n".join([*lines, self._next_with_a_run(wrote)])
-        return "\n".join([*lines, *self._next_with_recordings(f" {said}" if said else "")])
+            return "\n".join([*lines, self._next_with_a_run(wrote, {"case": said.get("case", ["CASE"])})])
+        return "\n".join([*lines, *self._next_with_recordings(said or {"case": ["CASE"]})])
 
-    def _next_with_a_run(self, wrote: str) -> str:
+    def _next_with_a_run(self, wrote: str, said: Mapping[str, Sequence[str | float]]) -> str:
         """What to do with a CFD run: in the file that was written, in one that was given, or in one to be written."""
         name = "" if wrote else self.runs[0].file
         usable = Path(name).is_file() and name.endswith(".toml")
         usable = usable or any(f.path == name and f.format == RUN for f in self.files)
         file = wrote or (name if usable else "study.toml" if self.runs[0].studies else "run.toml")
         lead = f"{wrote} written. " if wrote else "" if file == name else f"With --out {file}: "
-        return f"{lead}Next: bemt compare {shlex.quote(file)} --case CASE   (a case: bemt new 10x5)\n"
+        return f"{lead}Next: bemt compare {' '.join([shlex.quote(file), *options_of(said)])}{_a_case(said)}\n"
 
-    def _next_with_recordings(self, said: str) -> list[str]:
+    def _next_with_recordings(self, said: Mapping[str, Sequence[str | float]]) -> list[str]:
         """What to do with recordings of loads, if they have the speed."""
         read = [(f.path, f.record.kind, set(named(f.record).values)) for f in self.files if f.record]
-        loaded = [shlex.quote(path) for path, _, channels in read if "rpm" in channels and _LOADS & channels]
+        loaded = [shlex.quote(p) for p, _, known in read if _LOADS & known and "rpm" in {*known, *said}]
         if not loaded and any(_LOADS & channels for _, kind, channels in read if kind == "bench"):
             return ["Next: a column headed rpm, the speed of every row; no model can be set beside loads without it\n"]
         if not loaded:
             return []
-        step = f"Next: bemt diagnose {loaded[0]} --case CASE{said}   (a case: bemt new 10x5)\n"
-        return [step + (f"      bemt compare {loaded[0]} {loaded[1]}{said}\n" if len(loaded) == 2 else "")]
+        step = f"Next: {' '.join(['bemt diagnose', loaded[0], *options_of(said)])}{_a_case(said)}\n"
+        pair = options_of({k: v for k, v in said.items() if k in ("unit", "column", "sign")})
+        return [step + (f"      {' '.join(['bemt compare', *loaded, *pair])}\n" if len(loaded) == 2 else "")]
+
+
+def _a_case(said: Mapping[str, Sequence[str | float]]) -> str:
+    """How to make the case that a command has a word for."""
+    return "   (a case: bemt new 10x5)" if said["case"] == ["CASE"] else ""

@@ -6,7 +6,7 @@ import math
 import re
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from bemt.base.units import KNOT, MPH, RPM, ZERO_CELSIUS, split_suffix
 from bemt.data.readers.headings import counts_electrical, may_be_shaft_speed, surely_shaft_speed
 from bemt.data.recordings.channels import MEASURED, in_one_step, moves, named
 from bemt.data.recordings.findings import zero_thrust_speed
+from bemt.data.recordings.shown import options_of
 from bemt.physics.air import AIR_C, Air
 from bemt.physics.dataset import Dataset
 
@@ -308,6 +309,8 @@ class Invocation:
     air_b: str | None = None  # Air of B
     label: str | None = None  # Label that gives the diameter
     case: str | None = None  # Case of the rotor
+    diameter_m: float | None = None  # Of the rotor [m]
+    stated: Mapping[str, Sequence[str]] = field(default_factory=dict)  # Of the columns: unit, column and sign
 
     @property
     def chosen(self) -> bool:
@@ -326,7 +329,9 @@ class Invocation:
             words += [word for row in rows for word in (option, row)]
         options = {"--air-a": given.air_a, "--air-b": given.air_b, "--label": given.label, "--case": given.case}
         words += [word for option, text in options.items() if text is not None for word in (option, text)]
-        return " ".join(["bemt compare", *(shlex.quote(word) for word in words)])
+        size = [] if given.diameter_m is None else [given.diameter_m]
+        more = options_of({"diameter-m": size, **given.stated})
+        return " ".join(["bemt compare", *(shlex.quote(word) for word in words), *more])
 
     def with_rows(self, letter: str, column: str) -> str:
         """Command that also chooses a range of one column of A or B; LOW and HIGH are the user's to fill in."""

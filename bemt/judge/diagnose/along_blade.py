@@ -197,6 +197,9 @@ def _condition(
         got = f"slices without a speed, and {n.size} readings at {n.min():g} to {n.max():g} rev/min"
         got += f", {v.min():g} to {v.max():g} m/s"
         raise InputError(Fault(path.as_posix(), "rpm", got, "the speed of the slices", "A column rpm in their table"))
+    if n.size and not here.any():
+        reach = " to ".join(dict.fromkeys(speed_text(float(x)) for x in (n.min(), n.max())))
+        whose += f"; nothing was recorded there: the readings are at {reach} rev/min"
     if not one:
         speed, whose = (case.rpm, "of the case") if speed is None else (speed, whose)
         return SliceCondition(speed, case.airspeed_m_s if wind is None else wind, loads.density, whose)

@@ -16,6 +16,7 @@ from bemt.base.errors import Fault, InputError, refuse, system_fault
 from bemt.base.given import number, path_text
 from bemt.data.recordings.grid_study import together
 from bemt.data.recordings.load import as_stated, import_file
+from bemt.data.recordings.shown import options_of
 from bemt.judge.compare import one_run
 from bemt.judge.diagnose import figures as pictures
 from bemt.judge.diagnose import folder
@@ -168,7 +169,7 @@ def several(given: Any) -> list[Any]:
 def diagnosed(
     recordings: Any, case: Any, reference: Any, reference_case: Any, *, only: Sequence[str], ruled_out: Sequence[str],
     changed: Sequence[str], off: Sequence[str], baseline: str, channels: Sequence[str], rpm: Any, airspeed_m_s: Any,
-    repeatability_pct: float | None, top_rpm: float | None, along: Any, out: Any, figures: bool,
+    density_kg_m3: Any, repeatability_pct: float | None, top_rpm: float | None, along: Any, out: Any, figures: bool,
     progress: Callable[[str], None] | None,
     run: Mapping[str, Any],
 ) -> Answer | OnePoint:  # fmt: skip
@@ -182,23 +183,29 @@ def diagnosed(
         raise InputError(Fault("--top-rpm", "", f"{top_rpm:g}", "a speed above 0 rev/min"))
     target = None if out is None else path_text("out", out)
     theirs = None if reference_case is None else cases_of([reference_case], off, 1)[0]
-    speeds, winds = (np.atleast_1d(np.asarray(v, dtype=float)).tolist() for v in (rpm, airspeed_m_s))
+    speeds, winds, air = (
+        np.atleast_1d(np.asarray(v, dtype=float)).tolist() for v in (rpm, airspeed_m_s, density_kg_m3)
+    )
     speed = {"rpm": speeds[0]} if len(speeds) == 1 and any(run.values()) else {}
     stated = as_stated(files, {**run, **speed})
-    cases, records = load_all(stated, given, known, off, only, before=lambda found: folder.check(target, found),
-                              rpm=speeds, airspeed_m_s=winds, ruled_out=[*ruled_out, *changed],
-                              reference_case=theirs)  # fmt: skip
+    known_of = known if run["zones"] else as_stated(known, run)
+    cases, records = load_all(stated, given, known_of, off, only, before=lambda found: folder.check(target, found),
+                              rpm=speeds, airspeed_m_s=winds, density_kg_m3=air,
+                              ruled_out=[*ruled_out, *changed], reference_case=theirs)  # fmt: skip
     repeats = np.nan if repeatability_pct is None else repeatability_pct / 100.0
     records = [replace(r, repeatability=repeats, top_rpm=np.inf if top_rpm is None else top_rpm) for r in records]
     chosen = cases * len(stated) if len(cases) == 1 else cases
     each = cases if theirs is None else [*chosen, *[theirs] * len(known)]
-    rest = _options({
-        "--case": _quoted(given, "CASE"), "--off": off, "--only": only,
-        "--reference-case": _quoted(several(reference_case), "CASE"), "--repeatability-pct": several(repeatability_pct),
-        **{f"--{name}": run[name] for name in ("unit", "column", "sign", "zones")},
-        "--top-rpm": several(top_rpm), "--baseline": [baseline] * (baseline != "bemt"),
+    rest = options_of({
+        "case": _named(given, "CASE"), "off": off, "only": only, "channels": channels,
+        "reference-case": _named(several(reference_case), "CASE"), "rpm": speeds, "airspeed-m-s": winds,
+        "density-kg-m3": air, "repeatability-pct": several(repeatability_pct),
+        "zones": run["zones"], "top-rpm": several(top_rpm),
+        "baseline": [baseline] * (baseline != "bemt"),
     })  # fmt: skip
-    asked = Given(_quoted(files, "RECORDING"), _quoted(known, "REFERENCE"), rest, tuple(ruled_out), tuple(changed))
+    stated_of = {name: run[name] for name in ("unit", "column", "sign")}
+    own, others = (tuple(map(shlex.quote, _named(*f))) for f in ((files, "RECORDING"), (known, "REFERENCE")))
+    asked = Given(own, others, " ".join(rest), tuple(ruled_out), tuple(changed), stated_of)
     heard = [CHANNELS[c] for c in channels] or None
     one = [v[0] if len(v) == 1 else None for v in (speeds, winds)]
     blade = {} if along is None else along_blade(cases[0], Path(path_text("along", along)), records, *one)
@@ -254,12 +261,6 @@ def _both_there(cases: list[Any], files: list[Any], known: list[Any], theirs: An
     refuse(faults)
 
 
-def _options(told: Mapping[str, Sequence[str | float]]) -> str:
-    """Options of a command, of those that were told."""
-    words = {option: [v if isinstance(v, str) else f"{v:g}" for v in values] for option, values in told.items()}
-    return " ".join(word for option, values in words.items() if values for word in (option, *values))
-
-
-def _quoted(given: Sequence[Any], word: str) -> tuple[str, ...]:
+def _named(given: Sequence[Any], word: str) -> list[str]:
     """Files as a command has them; objects of the library have a word in their place."""
-    return tuple(shlex.quote(one) if isinstance(one, str) else word for one in given)
+    return [one if isinstance(one, str) else word for one in given]

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -214,10 +212,7 @@ def _commands(chosen: suggestion.Suggestion, given: suggestion.Given) -> tuple[s
     if chosen.kind == "run":
         return (given.command(run="new_run.csv"),)
     if chosen.kind == "look" and chosen.commands:  # what the file does not say of itself
-        kept = [Path(shlex.split(f)[0]).with_name("recording.toml").as_posix() for f in given.recordings]
-        stated = (f"bemt import {f} {chosen.commands[0]} --out {shlex.quote(out)}"
-                  for f, out in zip(given.recordings, kept, strict=True))  # fmt: skip
-        return *stated, replace(given, recordings=tuple(map(shlex.quote, kept))).command()
+        return given.kept(*chosen.commands)
     if chosen.kind == "look":
         return (given.command(ruled_out=chosen.checks),)
     if chosen.kind == "air":

@@ -30,6 +30,8 @@ from bemt.judge.diagnose.by_laws import changed
 from bemt.rotors.propeller import Propeller, rotor_of
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from bemt.data.recordings.findings import Finding
     from bemt.judge.diagnose.suggest import Given
     from bemt.physics.dataset import Dataset
@@ -88,6 +90,13 @@ class Contrast(Answered):
     def _document(self) -> dict[str, Any]:
         return self.document
 
+    def to_pandas(self) -> pd.DataFrame:
+        """A row for each channel that both recorded: ``ratio`` of B over A, its ends and how it changes along n."""
+        import pandas as pd
+
+        rows = pd.DataFrame([{"channel": k, **v} for k, v in self.document["ratios"].items()])
+        return rows.drop(columns=[k for k in rows if isinstance(rows[k].iloc[0], (list, dict))])
+
     def picture(self) -> bytes:
         """The two recordings and what changed, as PNG."""
         from bemt.judge.compare.first_picture import picture
@@ -132,7 +141,8 @@ def compare(
     asked = Invocation(
         names[0], names[1], tuple(rows_a), tuple(rows_b), air_a, air_b, label,
         None if case is None else os.fspath(case) if isinstance(case, str | os.PathLike)
-        else rotor_of(case).case.path.as_posix(),
+        else rotor_of(case).case.path.as_posix(), diameter_m,
+        {k: v for k, v in (run or {}).items() if k in ("unit", "column", "sign")},
     )  # fmt: skip
     diameter_m = label_diameter(label) if diameter_m is None else diameter_m
     case = None if case is None else rotor_of(case).case
@@ -316,7 +326,8 @@ def _given(asked: Invocation) -> Given:
         def of_days(self) -> tuple[str, ...]:
             return (asked.with_days(),)
 
-    return _Pair((shlex.quote(asked.b),), (shlex.quote(asked.a),), f"--case {shlex.quote(asked.case or 'CASE')}")
+    case = f"--case {shlex.quote(asked.case or 'CASE')}"
+    return _Pair((shlex.quote(asked.b),), (shlex.quote(asked.a),), case, stated=asked.stated)
 
 
 def label_diameter(label: str | None) -> float | None:

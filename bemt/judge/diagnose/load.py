@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -17,7 +17,7 @@ from bemt.base.errors import Fault, InputError, gathered, refuse
 from bemt.base.packed import part_of
 from bemt.base.units import ZERO_CELSIUS
 from bemt.data.recordings.channels import file_name, named, stated
-from bemt.data.recordings.check import check
+from bemt.data.recordings.check import check, left_out
 from bemt.judge.compare.selection import one_rotor, speed_in_doubt, wind_of
 from bemt.judge.diagnose import record as records
 from bemt.physics import effects
@@ -28,7 +28,6 @@ from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.propeller import rotor_of
 
 if TYPE_CHECKING:
-    from bemt.data.recordings.findings import Finding
     from bemt.judge.diagnose.record import Record
     from bemt.rotors.case import Case
 
@@ -63,12 +62,13 @@ def cases_of(given: Sequence[Any], off: Sequence[str], n: int) -> list[Case]:
 
 def load(
     path: str, case: Case, imported: Dataset | None = None, rpm: float | None = None,
-    airspeed_m_s: float | None = None,
+    airspeed_m_s: float | None = None, density_kg_m3: float | None = None,
 ) -> Record:  # fmt: skip
     """Read one recording, whatever its format."""
+    from bemt.data.recordings.cfd_options import filled
     from bemt.data.recordings.cfd_run import is_run, run_at
     from bemt.data.recordings.cfd_setup import one_grid
-    from bemt.data.recordings.load import filled, import_file
+    from bemt.data.recordings.load import import_file
     from bemt.data.recordings.reduce import reduce, reduction
 
     if imported is None:
@@ -80,7 +80,7 @@ def load(
         run, gains = one_grid(imported)
         made = records.from_series(run, case, gains)
         return replace(made, notes=(*made.notes, *imported.notes), computed=True)
-    imported = filled(imported, rpm, airspeed_m_s)
+    imported = filled(imported, rpm, airspeed_m_s, density_kg_m3)
     speed_in_doubt(imported, path)
     _speed_missing(imported, path)
     _airspeed_in_doubt(imported, case, path)
@@ -88,7 +88,7 @@ def load(
     ducted = case.ducted
     findings = check(imported, diameter_m=case.diameter_m, blades=int(case.get("rotor.blades")), ducted=ducted)
     found = tuple(f"{Path(path).name}: {f}" for f in findings if f.severity != "note")
-    imported = _without_misread(imported, findings)
+    imported = left_out(imported, findings)
     rows = named(imported)
     # in the log of a stand the sign is the hand of the rotor; in somebody's own table it may be a slip
     log = imported.format != "table"
@@ -109,16 +109,10 @@ def load(
     turned = ("torque_Nm: negative under load (sense of rotation): sign reversed here",) if hand else ()
     notes = (*made.notes, *turned, *imported.notes, *rows.notes, *_unused(imported, rows, case))
     broken = tuple(f for f in findings if f.severity == "error" or (f.id == "sign_flipped" and f.severity == "warning"))
-    return replace(made, findings=found, contradictions=broken, notes=notes, computed=imported.kind == "cfd")
-
-
-def _without_misread(imported: Dataset, findings: Sequence[Finding]) -> Dataset:
-    values = {**imported.values}
-    for f in findings:
-        if f.id == "misread":
-            values[f.channel] = np.array(values[f.channel])
-            values[f.channel][list(f.rows)] = np.nan
-    return replace(imported, values=values)
+    units = imported.provenance.get("declared", {})
+    declared = {k: units[name] for k in rows.values if (name := file_name(rows, k)) in units}
+    return replace(made, findings=found, contradictions=broken, notes=notes, computed=imported.kind == "cfd",
+                   declared=declared)  # fmt: skip
 
 
 def _speed_missing(imported: Dataset, path: str) -> None:
@@ -218,8 +212,8 @@ def _points(imported: Dataset, rows: Dataset, path: str) -> Dataset:
 def load_all(
     recordings: Sequence[Any], cases: Sequence[Any], references: Sequence[Any] = (), off: Sequence[str] = (),
     only: Sequence[str] = (), before: Callable[[Sequence[Case]], None] | None = None,
-    rpm: Sequence[float] = (), airspeed_m_s: Sequence[float] = (), ruled_out: Sequence[str] = (),
-    reference_case: Case | None = None,
+    rpm: Sequence[float] = (), airspeed_m_s: Sequence[float] = (), density_kg_m3: Sequence[float] = (),
+    ruled_out: Sequence[str] = (), reference_case: Case | None = None,
 ) -> tuple[list[Case], list[Record]]:  # fmt: skip
     """Cases of the recordings, and recordings with the references last; each a path, a Dataset or a DataFrame.
 
@@ -236,31 +230,33 @@ def load_all(
         prepare_case(case, None, 10)  # an unknown effect in the case is said before the work begins
     chosen = found * len(recordings) if len(found) == 1 else found
     counts = (len(recordings), len(recordings) + len(references))
-    speeds, winds = _each("--rpm", rpm, *counts), _each("--airspeed-m-s", airspeed_m_s, *counts)
+    given = {"rpm": rpm, "airspeed_m_s": airspeed_m_s, "density_kg_m3": density_kg_m3}
+    columns = zip(*(_each(f"--{k.replace('_', '-')}", v, *counts) for k, v in given.items()), strict=True)
+    told = [dict(zip(given, row, strict=True)) for row in columns]
     of_each = [*chosen, *[reference_case or found[0]] * len(references)]
-    files = list(zip([*recordings, *references], of_each, speeds, winds, strict=True))
+    files = list(zip([*recordings, *references], of_each, told, strict=True))
     if references and len(found) > 1 and reference_case is None:
         hint = "--reference-case states that of the references"
         raise InputError(Fault("--reference", "", f"{len(found)} cases", "one case for all, or theirs", hint))
     own, other = files[: len(recordings)], files[len(recordings) :]
     steps = [*_on_grids(own), *(s := _on_grids(other))]
-    read = _together(*(partial(_read, p, c, d, n, v) for p, c, n, v, d in steps))
+    read = _together(*(partial(_read, p, c, d, told) for p, c, told, d in steps))
     known = [replace(r, reference=True) for r in read[len(read) - len(s) :]]
     return found, [*read[: len(read) - len(s)], *known]
 
 
-_File = tuple[Any, "Case", float | None, float | None]
+_File = tuple[Any, "Case", dict[str, float | None]]
 
 
-def _on_grids(files: Sequence[_File]) -> list[tuple[Any, Case, float | None, float | None, Dataset | None]]:
+def _on_grids(files: Sequence[_File]) -> list[tuple[Any, Case, dict[str, float | None], Dataset | None]]:
     """Files with the CFD run that each is; runs of one condition on several grids are one study, no repeats."""
     from bemt.data.recordings.cfd_run import run_at
     from bemt.data.recordings.grid_study import are_grids, together
 
     runs: dict[int, Dataset] = {}
-    for i, (path, _, rpm, wind) in enumerate(files if len(files) > 1 else ()):
+    for i, (path, _, told) in enumerate(files if len(files) > 1 else ()):
         with suppress(InputError):  # said where it is loaded
-            if isinstance(path, str) and (run := run_at(path, rpm, wind)) is not None:
+            if isinstance(path, str) and (run := run_at(path, told["rpm"], told["airspeed_m_s"])) is not None:
                 runs[i] = run
     out, taken = [], set[int]()
     for i, file in enumerate(files):
@@ -275,13 +271,13 @@ def _on_grids(files: Sequence[_File]) -> list[tuple[Any, Case, float | None, flo
     return out
 
 
-def _read(given: Any, case: Case, run: Dataset | None, rpm: float | None, airspeed_m_s: float | None) -> Record:
+def _read(given: Any, case: Case, run: Dataset | None, told: Mapping[str, float | None]) -> Record:
     if isinstance(given, str):
-        return load(given, case, run, rpm, airspeed_m_s)
+        return load(given, case, run, **told)
     if isinstance(given, Dataset) and given.format == "cfd_run":
         return load(given.name, case, given)
     if isinstance(given, Dataset) and "stated" in given.provenance:
-        return load(given.provenance["stated"], case, given, rpm, airspeed_m_s)
+        return load(given.provenance["stated"], case, given, **told)
     return records.from_series(given if isinstance(given, Dataset) else from_pandas(given), case)
 
 

@@ -78,6 +78,7 @@ class Record:
     electrical: bool = False  # Whether torque is electrical power over the indicated speed
     top_rpm: float = np.inf  # Fastest that the stand may run [rev/min]
     computed: bool = False  # Whether the points are those of CFD
+    declared: Mapping[str, float] = field(default_factory=dict)  # Unit of the heading, by channel [its own unit]
 
     def __len__(self) -> int:
         """Give the number of points."""
@@ -382,6 +383,7 @@ def merged(records: Sequence[Record]) -> Record:
         findings=_once(r.findings for r in records), contradictions=_once(r.contradictions for r in records),
         repeatability=float(np.fmax.reduce([r.repeatability for r in records])), electrical=False,
         top_rpm=min(r.top_rpm for r in records), computed=all(r.computed for r in records),
+        declared={k: v for k, v in whole.declared.items() if all(r.declared.get(k) == v for r in records)},
     ))  # fmt: skip
 
 

@@ -16,7 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
+from bemt.base.units import RPM, UNITS
 from bemt.physics import effects
+from bemt.physics.effects.unit_slip import UnitSlip
 
 if TYPE_CHECKING:
     from bemt.judge.diagnose.problem import Problem
@@ -102,6 +104,28 @@ class Candidate:
         return int(np.nanargmin(np.where(size > 0, np.abs(size - median), np.nan)))
 
 
+_CONVERTED = float(np.exp(-2.0))  # Share of numbers that were converted wrongly before they were headed: declared [1]
+_DIMENSIONS = {"thrust_N": "force", "torque_Nm": "torque", "rpm": "angular_speed", "airspeed_m_s": "speed",
+               "density_kg_m3": "density"}  # fmt: skip
+
+
+def actual_unit(channel: str, factor: float, declared: Mapping[str, float]) -> str:
+    """Unit of the numbers of a channel whose heading has the unit `declared`, in that of the channel; "" for none.
+
+    >>> [actual_unit("airspeed_m_s", factor, {"airspeed_m_s": 1.0 / 3.6}) for factor in (1.0 / 3.6, 0.3048)]
+    ['m_s', '']
+    """
+    size = declared.get(channel, 1.0) / factor * (RPM if channel == "rpm" else 1.0)
+    alike = (u for u in UNITS.values() if u.dimension == _DIMENSIONS[channel])
+    return next((u.suffix for u in alike if np.isclose(size, u.factor, rtol=1e-6)), "")
+
+
+def _heading_odds(slip: UnitSlip, declared: Mapping[str, float]) -> float:
+    """Share that is left of the odds of a slip beside the units of headings; all of it where they are SI. [1]"""
+    si = declared.get(slip.channel, 1.0) == 1.0
+    return 1.0 if si or slip.factor < 0.0 or actual_unit(slip.channel, slip.factor, declared) else _CONVERTED
+
+
 def effect_of(id: str, setting: Setting) -> Effect:  # noqa: A002
     """Effect with a setting of its parameters."""
     return effects.catalogue()[id](**setting)
@@ -141,6 +165,8 @@ def _candidate(problem: Problem, name: str, cls: type[Effect]) -> Candidate | No
             share = (
                 effect.odds() * float(np.prod([p.density(float(setting[k])) for k, p in sizes.items()])) / len(given)
             )
+            if isinstance(effect, UnitSlip):
+                share *= min(_heading_odds(effect, p.record.declared) for p in problem.parts)
             columns.append((dict(setting), problem.signature((effect,)), True, share))
     else:
         axes = [p for p in cls.parameters if p.steps > 0]

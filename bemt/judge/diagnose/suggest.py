@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,9 +13,9 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.gaussian.whitening import whitener
-from bemt.base.units import ZERO_CELSIUS, Unit
+from bemt.base.units import ZERO_CELSIUS, suffixes
 from bemt.data.readers.recording_toml import QUANTITIES
-from bemt.data.readers.unit_text import unit_of
+from bemt.data.recordings.shown import options_of
 from bemt.judge.compare.change_document import AIR_OF_BOTH, DAYS
 from bemt.judge.diagnose import noise
 from bemt.judge.diagnose.assemble import assemble
@@ -22,7 +24,7 @@ from bemt.judge.diagnose.nuisance import PRIORS
 from bemt.judge.diagnose.problem import Part, Problem
 from bemt.judge.diagnose.record import Record
 from bemt.judge.diagnose.repeats import conditions
-from bemt.judge.diagnose.signatures import effect_of
+from bemt.judge.diagnose.signatures import actual_unit, effect_of
 from bemt.physics import effects
 from bemt.physics.air import R_DRY
 from bemt.physics.bem import model as bem
@@ -73,6 +75,7 @@ class Given:
     rest: str = "--case CASE"  # Options
     ruled_out: tuple[str, ...] = ()  # Effects that a check has ruled out
     changed: tuple[str, ...] = ()  # Effects that the user says he changed
+    stated: Mapping[str, Sequence[str]] = field(default_factory=dict)  # Of the columns: unit, column and sign
 
     def command(self, run: str = "", reference: str = "", ruled_out: str = "") -> str:
         """Command that diagnoses the same again, with one more file or one effect less."""
@@ -80,12 +83,24 @@ class Given:
         known = [*self.references, *([reference] if reference else [])]
         gone = [*self.ruled_out, *([ruled_out] if ruled_out else [])]
         words = ["bemt diagnose", *files, *(["--reference", *known] if known else []), self.rest]
-        said = ["--changed", *self.changed] if self.changed else []
+        said = [*options_of(self.stated), *(["--changed", *self.changed] if self.changed else [])]
         return " ".join([*words, *said, *(["--ruled-out", *gone] if gone else [])])
 
     def comparison(self, reference: str) -> str:
         """Command that sets the first recording beside a reference."""
-        return f"bemt compare {reference} {self.recordings[0]}"
+        return " ".join(["bemt compare", reference, self.recordings[0], *options_of(self.stated)])
+
+    def kept(self, option: str, fact: str) -> tuple[str, ...]:
+        """Commands that keep what is stated of each table, and one more fact, in a file, and diagnose that instead."""
+        facts = [f for f in self.stated.get(option, ()) if f.partition("=")[0] != fact.partition("=")[0]]
+        told = " ".join(options_of({**self.stated, option: [*facts, fact]}))
+        paths = [Path(shlex.split(f)[0]) for f in self.recordings]
+        if any(p.suffix == ".toml" for p in paths):
+            return ()  # whose lines are to be changed by hand
+        names = ["recording.toml"] if len(paths) == 1 else [f"{path.stem}.toml" for path in paths]
+        files = [shlex.quote(p.with_name(n).as_posix()) for p, n in zip(paths, names, strict=True)]
+        imports = (f"bemt import {f} {told} --out {k}" for f, k in zip(self.recordings, files, strict=True))
+        return *imports, replace(self, recordings=tuple(files), stated={}).command()
 
     def of_days(self) -> tuple[str, ...]:
         """Command that compares with each reference in the air of both days."""
@@ -425,16 +440,23 @@ def correction(names: Sequence[str], settings: Mapping[str, Mapping[str, Any]], 
         text, found = _check(name, record), settings.get(name, {})
         if float(found.get("factor", 1.0)) < 0.0 and "channel" in found:
             text = f"reverse the sign of {found['channel']} (sign = -1 in a recording.toml), or turn the sensor round"
-        return Suggestion(text, (), (), 0.0, 0.0, "look", _restated(found))
+        return Suggestion(text, (), (), 0.0, 0.0, "look", _restated(found, record))
     return None
 
 
-def _restated(found: Mapping[str, Any]) -> tuple[str, ...]:
-    """Option of `bemt import` that states the unit of a channel, where a setting of unit_slip names one."""
-    quantity = str(found.get("channel", "")).rpartition("_")[0]
-    unit = unit_of(str(found.get("unit", "")))
-    known = isinstance(unit, Unit) and unit.dimension == QUANTITIES.get(quantity)
-    return (f"--unit {quantity}={found['unit']}",) if known else ()
+def _restated(found: Mapping[str, Any], record: Record) -> tuple[str, ...]:
+    """Option of `bemt import` and what it states of a channel, where a setting of unit_slip leaves a unit or a sign.
+
+    It is the unit of the heading over the factor of the slip: km/h under which 0.278 of the speed is recorded are m/s.
+    """
+    channel = str(found.get("channel", ""))
+    quantity = next((q for q, d in QUANTITIES.items() if channel in (q, f"{q}_{suffixes(d)[0]}")), "")
+    if not quantity or "unit" not in found:
+        return ()
+    if found["factor"] < 0.0:
+        return "sign", f"{quantity}=-1"
+    unit = actual_unit(channel, float(found["factor"]), record.declared)
+    return ("unit", f"{quantity}={unit}") if unit else ()
 
 
 def _check(name: str, record: Record) -> str:

@@ -169,12 +169,13 @@ def _worst(found: Sequence[_Thrust]) -> list[str]:
 
 
 def _ducts(solved: Sequence[Result]) -> list[str]:
-    """Why K1/K2 is far off for a ducted fan."""
+    """What the duct carries, and why K1/K2 is far off for a ducted fan."""
     told = []
     for result in solved:
         own, simple = result.first("bemt"), result.first("k1k2")
         if result.kind == "fan" and own and simple and own.thrust_N > 0.0:
-            told.append(f"{number_text(simple.thrust_N / own.thrust_N, 2)} of BEMT on {result.name[:30]}")
+            share = f", whose duct has {100 * result.fan.duct_share:.0f} % of the thrust" if result.fan else ""
+            told.append(f"{number_text(simple.thrust_N / own.thrust_N, 2)} of BEMT on {result.name[:30]}{share}")
     words = (
         f"K1/K2 gives {', '.join(told[:3])}: it is a fit to open propellers with diameter and pitch only. It ignores "
         "the duct and the number of blades."
@@ -236,8 +237,7 @@ def _grids(solved: Sequence[Result], cut: bool) -> list[str]:
     for result in solved:
         if grid := result.grid:
             where = f", {grid.file}" if grid.file else ", kept with --out DIR"
-            told = f"grid of {result.name}: {grid.points} points, {grid.unconverged} unconverged{where}"
-            lines.append(told)
+            lines.append(f"grid of {result.name}: {grid.points} points, {grid.unconverged} unconverged{where}")
     return [part for line in lines[:4] for part in _short(line, cut)]
 
 
