@@ -118,7 +118,7 @@ _SI = {"force": "N", "torque": "Nm", "rotation": "rev/min", "airspeed": "m/s", "
 _TABLE: dict[str, tuple[tuple[str, str, float], ...]] = {
     "force": (
         ("kgf", "N", 0.0), ("lbf", "N", 0.0), ("gf", "N", 0.0), ("kgf", "gf", 0.0), ("kgf", "lbf", 1.0),
-        ("lbf", "gf", 1.0), ("ozf", "N", 2.0),
+        ("lbf", "gf", 1.0), ("ozf", "N", 2.0), ("ozf", "gf", 2.0),
     ),
     "length": (("mm", "m", 0.5), ("in", "m", 0.5), ("in", "mm", 0.5), ("cm", "m", 1.0)),
     "rotation": (

@@ -131,9 +131,10 @@ def import_(
         if out is None:  # no command takes these two: a file keeps them
             hint = f"Add --out {Path(table).with_name('recording.toml').as_posix()}"
             raise InputError(Fault("", "--out", "nothing", "a recording.toml that keeps what you state", hint))
-        if airspeed_m_s is not None:
-            hint = "Head a column airspeed_m_s, or give it to the command that takes the file"
-            raise InputError(Fault("", "--airspeed-m-s", f"{airspeed_m_s:g} with --out", "no airspeed", hint))
+        for option, name, value in (("--airspeed-m-s", "airspeed_m_s", airspeed_m_s), ("--rpm", "rpm", rpm)):
+            if value is not None:  # a recording.toml has no place for it
+                hint = f"Head a column {name}, or give {option} to the command that takes the file"
+                raise InputError(Fault("", option, f"{value:g} with --out", f"no {option}", hint))
         facts = told["unit"], told["column"], told["sign"], pole_pairs, density_kg_m3
         written = write_recording(table, os.fspath(out), *facts, ignore=left).as_posix()
         kept, said = written, {}

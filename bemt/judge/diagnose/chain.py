@@ -58,6 +58,7 @@ def diagnose(
     loads = [(r.only(CHANNELS[:2]), c) for r, c in told if set(r.measured) - {speed}]
     turns = [(r.only((speed,)), c) for r, c in told if speed in r.measured]
     files = (*given.references[:1], *given.recordings[:1])
+    gone = {*given.ruled_out, *(() if only is None else effects.catalogue().keys() - set(only))}
 
     def judged(pair: RunChange) -> Judgement:
         return by_laws.judged(pair, only, given.ruled_out)
@@ -71,7 +72,7 @@ def diagnose(
         some: Sequence[tuple[Record, Case]], ids: Sequence[str] | None,
         ratios: Callable[[Collection[str]], RunChange | None] = lambda _: None, rotor: Diagnosis | None = None,
     ) -> Diagnosis:  # fmt: skip
-        return _diagnose([r for r, _ in some], [c for _, c in some], ids, say, baseline, given, ratios, rotor)
+        return _diagnose([r for r, _ in some], [c for _, c in some], ids, say, baseline, given, ratios, rotor, gone)
 
     def tested(some: Sequence[tuple[Record, Case]]) -> bool:
         return any(not r.reference for r, _ in some)
@@ -92,7 +93,7 @@ def diagnose(
 def _diagnose(
     records: Sequence[Record], cases: Sequence[Case], only: Sequence[str] | None, say: Callable[[str], None],
     baseline: str, given: suggestion.Given, ratios: Callable[[Collection[str]], RunChange | None],
-    rotor: Diagnosis | None,
+    rotor: Diagnosis | None, gone: Collection[str],
 ) -> Diagnosis:  # fmt: skip
     say("baseline and nuisances")
     problem = build(records, cases, baseline)
@@ -106,8 +107,6 @@ def _diagnose(
     absent |= dict.fromkeys(given.ruled_out, "ruled out by a check")
     problem, candidates = ask_reference(problem, candidates)
     say("weighing explanations")
-    every = effects.catalogue()
-    gone = given.ruled_out if only is None else [*given.ruled_out, *(i for i in every if i not in only)]
     found = posterior.weigh(problem, candidates, gone=gone)
     change = ratios(absent.keys()) if any(p.record.reference for p in problem.parts) else None
     found = replace(found, probability=knowledge.combined(found, change))
@@ -116,7 +115,7 @@ def _diagnose(
     decision = knowledge.reason(problem, decision)
     shown = decision.leading if all(i in found.spans for i in decision.leading) else _solved(found)
     best, parameters = fitting.refined(found, fitting.fit(found, shown))
-    parameters = fitting.widened(parameters)
+    parameters = fitting.widened(parameters) if shown == decision.leading or decision.verdict not in loss.CLAIMS else {}
     say("held-out blocks")
     words, held, gp_only = held_out(found, shown if decision.verdict != "unknown" else NONE)
     if decision.verdict == "unknown":  # what is not in the library is predicted as what it is: something smooth
@@ -243,6 +242,10 @@ def _settling(found: posterior.Evidence, decision: loss.Decision, best: fitting.
         return suggestion.mended(found, mend)
     if other_rotor.doubted(found.problem, decision):
         return suggestion.mended(found, suggestion.WHOSE, "case")
+    told = decision.verdict in loss.CLAIMS and decision.leading
+    if told and not all(i in found.spans for i in told):  # known by its law alone: a look tells
+        if looked := suggestion.look([next(i for i in told if i not in found.spans)], found.problem.parts[0].record):
+            return looked
     if not singles:
         return suggestion.Suggestion(suggestion.REFERENCE, (), (), 0.0, 0.0, "reference")
     if decision.verdict == "insufficient" and (note := suggestion.weather(found)):

@@ -20,6 +20,7 @@ from bemt.judge.diagnose.record import DROPPED, NO_SPEED
 from bemt.judge.diagnose.suggest import LEVEL
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation, Size
 from bemt.physics import effects
+from bemt.physics.effects.propeller import AnotherPropeller
 
 if TYPE_CHECKING:
     from bemt.judge.diagnose.answer import Diagnosis, Location
@@ -221,10 +222,11 @@ def explanation(d: Diagnosis) -> list[str]:
         f"{_CHANNEL[c].lower()} by {_share(v) if abs(v) > 1.0 else f'{v:+.0%}'}" for c, v in level.items()
     )
     alone, doubted = d.problem.free.all(), other_rotor.doubted(d.problem, decision)
-    if alone and not d.problem.findings and level and min(abs(v) for v in level.values()) > _ANOTHER_ROTOR:
-        far = "" if doubted else f"Your rotor is far from the case ({off}). Check diameter, pitch and " \
-                                                "blades first. "  # fmt: skip
-        lines.append(f"{far}Nearest rotors: {other_rotor.nearest_rotors(d.problem)}.")
+    open_ = alone and decision.verdict in ("insufficient", "unknown") and not d.problem.findings
+    far = open_ and level and min(abs(v) for v in level.values()) > _ANOTHER_ROTOR and not doubted
+    if far or doubted or decision.effects[:1] == (AnotherPropeller.id,):
+        lead = f"Your rotor is far from the case ({off}). Check diameter, pitch and blades first. " if far else ""
+        lines.append(f"{lead}Nearest rotors: {other_rotor.nearest_rotors(d.problem)}.")
     if decision.verdict == "none":
         lines.append(f"Why: {decision.why}.")
         if max((abs(v) for v in level.values()), default=0.0) > _WORTH_SAYING:

@@ -392,15 +392,15 @@ def suggest(found: Evidence, rivals: Sequence[Rival], unknown: float = 0.0, refe
     able = [c for c in choices if c.gain * total >= _WORTH and (c.kind == "reference" or c.after >= _ENOUGH)]
     able.sort(key=lambda c: -c.gain / c.minutes)
     certain = before >= _ENOUGH and not reference
-    look = _look(names, part.record)
+    looked = look(names, part.record)
     worth = [c for c in choices if c.kind == "run" and c.gain * total >= _WORTH]
     # where no run is able to, one that tells only the others apart is better than nothing
-    instead = look or max(worth, key=lambda c: c.gain / c.minutes, default=None)
-    if able and not (look and certain):
+    instead = looked or max(worth, key=lambda c: c.gain / c.minutes, default=None)
+    if able and not (looked and certain):
         other = next((c for c in able if c.kind != able[0].kind), instead if able[0].kind == "reference" else None)
         return replace(able[0], otherwise=other)
-    if look:
-        return replace(look, before=before, after=before)
+    if looked:
+        return replace(looked, before=before, after=before)
     if certain:
         return Suggestion("no further run is needed; none would tell more", (), (), before, before, "")
     if reference and not _referenced(found):
@@ -417,7 +417,7 @@ def _distances(plan: Problem, of: Sequence[effects.Effect | None], hyper: noise.
     return np.asarray(np.nan_to_num(np.linalg.norm(y[:, None] - y[None], axis=-1)))
 
 
-def _look(names: Sequence[str], record: Record) -> Suggestion | None:
+def look(names: Sequence[str], record: Record) -> Suggestion | None:
     """A check by hand that confirms the first explanation or rules out the second, whichever there is."""
     for aim, name in zip(("confirm", "rule out"), names, strict=False):
         if check := _check(name, record):

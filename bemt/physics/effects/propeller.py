@@ -23,7 +23,7 @@ class AnotherPropeller(Effect):
 
     id = "propeller"
     title = "another propeller"
-    check = "compare label, blade count and weight"
+    check = "measure the diameter; compare label, blade count and weight"
     sign = "both loads change by large, different shares: pitch, blades, chord and section at once"
     parameters = (
         Parameter("thrust", "1", -0.8, 4.0, "declared; propellers that one motor turns", 3, 0.0, 0.4),
