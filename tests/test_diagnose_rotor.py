@@ -143,12 +143,18 @@ def test_loads_of_another_size_are_no_slip_of_the_speed(inch: float, plan: str) 
     assert said.found.probability[DOUBT] > 0.3
 
 
-def test_another_diameter_than_the_reference_has_is_another_propeller() -> None:
+@pytest.mark.parametrize("pulse", [False, True])
+def test_another_diameter_than_the_reference_has_is_another_propeller(pulse: bool) -> None:
+    """Also where loads and drive are judged apart."""
     guess, given = case("prop_10x5"), points("grid", 0.254)
     other = guess.replaced({"rotor.diameter_in": 9.0, "blade.pitch_in": 4.5})
     runs = [recording(rotor, given, noise=0.005, seed=k) for k, rotor in enumerate((guess, other))]
+    added = {"pwm_s": 1e-3 + 4e-8 * given["rpm"]} if pulse else {}
+    runs = [replace(run, values={**run.values, **added}) for run in runs]
     records = [replace(from_series(run, guess), reference=k == 0) for k, run in enumerate(runs)]
-    said = chain.diagnose(records, [guess]).decision
+    answer = chain.diagnose(records, [guess])
+    said = (answer.loads or answer).decision
     assert said.verdict in ("named", "class")
     assert "propeller" in said.effects, said
     assert not {"pitch_offset", "section", "air_density"} & set(said.effects), said
+    assert "diameter" in answer.next.text and not answer.parameters

@@ -60,7 +60,7 @@ _ABROAD = {  # English: as others write it, without accents, in lower case; a bl
     "propeller rotation speed": "propellerdrehzahl luftschraubendrehzahl rotordrehzahl",
     "radius": "半径 半徑 rayon raggio radio halbmesser promien радиус radialposition position~radiale posicion~radial "
     "posizione~radiale",
-    "chord": "弦长 弦長 sehne sehnenlange profiltiefe blatttiefe blattbreite corde corda cuerda cieciwa хорда "
+    "chord": "弦长 弦長 sehne sehnenlange tiefe profiltiefe blatttiefe blattbreite corde corda cuerda cieciwa хорда "
     "longueur~de~corde",
     "thickness": "dicke profildicke blattdicke epaisseur espesor spessore espessura grubosc dikte толщина 厚度",
     "blade angle": "einstellwinkel blattwinkel steigungswinkel calage angle~de~calage angle~de~pas angle~de~pale "

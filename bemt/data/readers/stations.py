@@ -148,7 +148,8 @@ def read_stations(path: Path, R: float) -> BladeStations:
     wanted = ("r", "chord", "beta" if by_name["beta"] or not by_name["pitch"] else "pitch")
     if lacking := [name for name in wanted if not by_name[name]]:
         header = source.lines[top - 1].strip()
-        source.refuse(top, f"the header {header!r}", EXPECTED, _hint(table.headings, lacking))
+        got = f"the header {header!r} without {' and '.join(lacking)}"
+        source.refuse(top, got, EXPECTED, _hint(table.headings, lacking))
     for name in wanted:
         if len(by_name[name]) > 1:
             source.add(top, " and ".join(c.heading for c in by_name[name]), "one of them")

@@ -355,7 +355,13 @@ def _sentence(
         return f"{who} and BEMT agree in {agree} of {len(every)} values; {rest}.{fluid}{tail}"
     if lost == len(every):
         return f"No value of {who} and BEMT can be compared.{tail}"
-    return f"{who} and BEMT agree within both bands.{tail}"
+    far = [(k, load) for k, load in every if abs(load.cfd) > _NEAR_ZERO * top[k] and load.u_both > 0.0]
+    if not far:
+        return f"{who} and BEMT agree within both bands.{tail}"
+    k, load = max(far, key=lambda x: abs(x[1].difference / x[1].cfd))
+    wide = f"both bands together are {100.0 * load.u_both / abs(load.cfd):.0f} %"
+    return f"{who} and BEMT agree within both bands: BEMT is off by {load.percent} in " \
+           f"{_LOADS[k].split(' [')[0].lower()}, {wide}.{tail}"  # fmt: skip
 
 
 def _narrower(points: Sequence[PointOfRun], moved: Sequence[Moved]) -> str:
