@@ -146,7 +146,7 @@ def eta(J: ArrayLike, CT: ArrayLike, CP: ArrayLike) -> Any:
     J CT/CP where the shaft takes power (CP > 0); exactly 0 at J = 0; negative where the propeller brakes
     (CT < 0); NaN where the shaft gives power (CP <= 0), because T V/P is then no efficiency.
 
-    At J = 0 the useful power T V is zero: use `FM` or `grams_per_watt` there.
+    At J = 0 the useful power T V is zero: use `FM` there.
 
     >>> eta([0.0, 0.5, 0.9, 1.2], [0.10, 0.05, -0.01, -0.05], [0.04, 0.035, 0.01, -0.02]).round(3)
     array([ 0.   ,  0.714, -0.9  ,    nan])

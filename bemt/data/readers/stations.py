@@ -214,7 +214,7 @@ def _other_unit(place: _Column, value: float, low: float, high: float, R: float)
         if u != "mm" and low <= value * 1e-3 / f <= high:
             option = f"--diameter-in {D:g}" if u == "in" else f"--diameter-mm {1e3 * f * D:g}"
             said.append(f"A diameter of {D:g} mm? {D:g} {u} is {option}")
-    return " ".join(said[:2]) or f"Is the tip radius {1e3 * R:g} mm?"
+    return " ".join([f"Is the tip radius {1e3 * R:g} mm?", *said[:2]])
 
 
 def _limits(source: SourceText, places: list[_Column], columns: tuple[Array, Array, Array], R: float) -> None:

@@ -212,7 +212,7 @@ def grid_study(
     highest = ORDERS[1] * formal_order
     if flag and len(f) == 3 and p > highest:  # no jump at the limit: the index there goes over into the spread
         least, over = fs * abs(e21 / f[0]) / (r[0] ** highest - 1.0), min(p / highest - 1.0, 1.0)
-        u = (least + over * max(3.0 * spread - least, 0.0)) / COVERAGE
+        u = (least + over * max(3.0 * spread - least, 0.0)) / COVERAGE if math.isfinite(spread) else math.inf
     else:
         u = max(fine, 3.0 * spread if flag and len(f) == 3 else 0.0) / COVERAGE
     return GridStudy(f, r, p, f[0] - e21 / factor, fine, coarse, asymptotic, fs, u, tuple(flags))
