@@ -277,7 +277,7 @@ def test_coefficients_and_numbers_follow_from_diameter_and_air() -> None:
     assert np.allclose(s["CT"], co.CT(values["thrust_N"], air.rho, n, D))
     assert np.allclose(s["CP"], 2 * np.pi * co.CQ(values["torque_Nm"], air.rho, n, D))
     assert np.allclose(s["FM"], co.FM(s["CT"], s["CP"])) and np.allclose(s["M_tip"], co.M_tip(n, D, air.a_sound))
-    assert np.allclose(s["efficacy_N_W"] * 1e3 / units.KGF, 1e3 / units.KGF * values["thrust_N"] / s["power_W"])
+    assert np.allclose(s["efficacy_N_W"], values["thrust_N"] / s["power_W"])
     flying = reduce(recording(values | {"airspeed_m_s": np.full(rows, 8.0)}), diameter_m=D)
     assert np.allclose(flying["J"], 8.0 / (n * D)) and np.all(np.isnan(flying["FM"]))
 

@@ -39,7 +39,7 @@ a pressure: the table tells."""
 _ALONE = {  # a heading that is the name of a unit
     "volts": ("voltage", "V"), "volt": ("voltage", "V"), "amps": ("current", "A"), "amp": ("current", "A"),
     "amperes": ("current", "A"), "watts": ("P", "W"), "newtons": ("F", "N"),
-    "grams": ("thrust", "gf"), "gramm": ("thrust", "gf"), "ounces": ("thrust", "ozf"),
+    "grams": ("F", "gf"), "gramm": ("F", "gf"), "ounces": ("F", "ozf"),
 }  # fmt: skip
 _WORDS = {  # heading in lower case that `_words` has no quantity for, or leaves open -> name, dimension
     "time": ("time", "time"), "airspeed": ("airspeed", "speed"), "throttle": ("throttle", "fraction"),

@@ -196,8 +196,9 @@ def diagnosed(
     records = [replace(r, repeatability=repeats, top_rpm=np.inf if top_rpm is None else top_rpm) for r in records]
     chosen = cases * len(stated) if len(cases) == 1 else cases
     each = cases if theirs is None else [*chosen, *[theirs] * len(known)]
+    of_case = " ".join(options_of({"case": _named(given, "CASE")}))
     rest = options_of({
-        "case": _named(given, "CASE"), "off": off, "only": only, "channels": channels,
+        "off": off, "only": only, "channels": channels,
         "reference-case": _named(several(reference_case), "CASE"), "rpm": speeds, "airspeed-m-s": winds,
         "density-kg-m3": air, "repeatability-pct": several(repeatability_pct),
         "zones": run["zones"], "top-rpm": several(top_rpm),
@@ -205,7 +206,7 @@ def diagnosed(
     })  # fmt: skip
     stated_of = {name: run[name] for name in ("unit", "column", "sign")}
     own, others = (tuple(map(shlex.quote, _named(*f))) for f in ((files, "RECORDING"), (known, "REFERENCE")))
-    asked = Given(own, others, " ".join(rest), tuple(ruled_out), tuple(changed), stated_of)
+    asked = Given(own, others, of_case, " ".join(rest), tuple(ruled_out), tuple(changed), stated_of)
     heard = [CHANNELS[c] for c in channels] or None
     one = [v[0] if len(v) == 1 else None for v in (speeds, winds)]
     blade = {} if along is None else along_blade(cases[0], Path(path_text("along", along)), records, *one)

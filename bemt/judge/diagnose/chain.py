@@ -217,9 +217,9 @@ def _commands(chosen: suggestion.Suggestion, given: suggestion.Given) -> tuple[s
     if chosen.kind == "air":
         return given.of_days()
     if chosen.kind == "rotor":
-        return f"bemt lab calibrate-rotor REFERENCE {given.rest}", given.command(reference="REFERENCE")
+        return f"bemt lab calibrate-rotor REFERENCE {given.case}", given.command(reference="REFERENCE")
     if chosen.kind == "case":
-        return (replace(given, rest="--case LABEL").command(),)
+        return (replace(given, case="--case LABEL").command(),)
     if chosen.kind == "mend":
         return tuple(f"bemt import {f}" for f in given.recordings)
     return ()
@@ -242,10 +242,10 @@ def _settling(found: posterior.Evidence, decision: loss.Decision, best: fitting.
         return suggestion.mended(found, mend)
     if other_rotor.doubted(found.problem, decision):
         return suggestion.mended(found, suggestion.WHOSE, "case")
-    told = decision.verdict in loss.CLAIMS and decision.leading
-    if told and not all(i in found.spans for i in told):  # known by its law alone: a look tells
-        if looked := suggestion.look([next(i for i in told if i not in found.spans)], found.problem.parts[0].record):
-            return looked
+    claimed = decision.leading if decision.verdict in loss.CLAIMS else NONE
+    by_law = [i for i in claimed if i not in found.spans]  # nothing was solved for these: a look tells
+    if by_law and (looked := suggestion.look(by_law[:1], found.problem.parts[0].record)):
+        return looked
     if not singles:
         return suggestion.Suggestion(suggestion.REFERENCE, (), (), 0.0, 0.0, "reference")
     if decision.verdict == "insufficient" and (note := suggestion.weather(found)):

@@ -1,7 +1,7 @@
-"""Is it this rotor at all: loads that no rotor of the case's values can have, and which slip would explain them.
+"""Is it this rotor at all: another rotor as a hypothesis, and which slip explains loads that no such rotor can have.
 
-A recording that is off by a factor of three in thrust is not one whose physics was left out: diameter, pitch, number of
-blades, a unit or the speed is another one.  The question comes before the physics, with the likely slips in order.
+A rotor of another size, pitch and section is weighed beside the effects.  Off by a factor of three in thrust is not one
+whose physics was left out: that question comes before the physics, with the likely slips in order.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bemt.base import unit_errors
 from bemt.base.arrays import Array
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from bemt.data.recordings.findings import Finding
     from bemt.judge.diagnose.problem import Problem
     from bemt.judge.loss import Decision
-    from bemt.physics.effects.base import Effect, RotorBuild
 
 UNREPEATABLE = 0.10
 """Scatter of repeats, share of the reading, that no stand has: something that is not recorded changes [1]."""
@@ -41,6 +41,8 @@ _OFF = 0.25
 _SHOWN = 3
 # Diameters of propellers that a stand takes, 5 to 15 in: standard deviation of the natural logarithm.
 _SIZES = 0.35
+# Powers of the diameter with which thrust and torque of similar rotors go.
+_POWERS = (4.0, 5.0)
 # Diameters differ from their labels by a share of this.
 _ROUNDED = 0.01
 # Fewest advance ratios that a curve is drawn through.
@@ -160,8 +162,10 @@ class Another:
     """Another rotor in the place of the case's: what its size changes, and what else is not known of it."""
 
     changes: Array  # (M, G) Of the readings, by diameter [units of the readings]
-    log_w: Array  # (G,) Logarithm of the prior weight of each diameter [1]
-    unknown: Array  # (G, M, K) One standard deviation each of blade area, pitch and section [units of the readings]
+    size: Array  # (G,) Logarithm of the diameter over the case's [1]
+    # One standard deviation each of blade area, pitch and section, of the case's size, (M, K) [units of the readings];
+    # and the diameters that go with it, (H,): any other rotor has any, one of the same make another one
+    families: tuple[tuple[Array, NDArray[np.intp]], ...]
 
     @classmethod
     def of(cls, problem: Problem) -> tuple[Explanation, Another] | None:
@@ -187,29 +191,28 @@ class Another:
             size = size[(size >= nodes[0]) & (size <= nodes[-1])]
             base = CubicSpline(nodes, table)(size)
         free = problem.free
-        scale = np.exp(np.where(problem.channel == 0, 4.0, 5.0) * size[:, None])
-        blade = np.nan_to_num(blade_tangents(problem))
-        changes = np.where(free, scale * base - problem.f0, 0.0).T
-        log_w = -0.5 * (size / _SIZES) ** 2
-        apart = np.abs(size) > 1.5 * _ROUNDED
-        area = np.zeros_like(problem.f0)
-
-        def open_(columns: Array) -> Array:
-            return scale[:, :, None] * np.where(free[:, None], columns, 0.0)
-
-        other = open_(np.column_stack([_AREA * problem.f0, blade * LABELLED]))
-        alike = open_(np.column_stack([area, blade * (LABELLED[0], *AS_BUILT[1:])]))[apart]
-        weight = np.concatenate([log_w - log_sum(log_w), log_w[apart] - log_sum(log_w[apart])]) - math.log(2.0)
-        another = cls(np.concatenate([changes, changes[:, apart]], axis=1), weight, np.concatenate([other, alike]))
+        scale = np.exp(np.array(_POWERS)[problem.channel][:, None] * size)
+        blade = np.where(free[:, None], np.nan_to_num(blade_tangents(problem)), 0.0)
+        area = np.where(free, _AREA * problem.f0, 0.0)
+        other, make = np.arange(size.size), np.flatnonzero(np.abs(size) > 1.5 * _ROUNDED)
+        families = ((np.column_stack([area, blade * LABELLED]), other),
+                    (blade * (LABELLED[0], *AS_BUILT[1:]), make))  # fmt: skip
+        changes = np.where(free[:, None], scale * base.T - problem.f0[:, None], 0.0)
+        another = cls(changes, size, tuple(f for f in families if f[1].size))
         return DOUBT if free.all() else Explanation.of(AnotherPropeller.id), another
 
-    def log_bayes(self, white: Conditional, residual: Array) -> float:
-        """Natural logarithm of the odds over none for whitened readings (N,) [1]."""
-        left = residual[:, None] - white.changes(self.changes)
-        out = []
-        for e, columns in zip(left.T, self.unknown, strict=True):
-            out.append(float(LinearTerms.of(white.changes(columns)).gain(e)) - 0.5 * float(e @ e))
-        return float(log_sum(out, self.log_w)) + 0.5 * float(residual @ residual)
+    def log_bayes(self, white: Conditional, residual: Array, channel: NDArray[np.intp]) -> float:
+        """Natural logarithm of the odds over none for whitened readings (N,) of ``channel`` (M,) [1]."""
+        left, each = residual[:, None] - white.changes(self.changes), []
+        loads = [(channel == c, np.exp(_POWERS[c] * self.size)) for c in np.unique(channel)]
+        log_w = -0.5 * (self.size / _SIZES) ** 2
+        for columns, sizes in self.families:
+            # one size scales all of a load alike: its columns are whitened once
+            parts = [(white.changes(np.where(mine[:, None], columns, 0.0)), k) for mine, k in loads]
+            gain = [float(LinearTerms.of(sum((k[g] * x for x, k in parts), np.zeros(()))).gain(left[:, g]))
+                    - 0.5 * float(left[:, g] @ left[:, g]) for g in sizes]  # fmt: skip
+            each.append(float(log_sum(gain, log_w[sizes]) - log_sum(log_w[sizes])))
+        return float(log_sum(each)) - math.log(len(each)) + 0.5 * float(residual @ residual)
 
 
 def _sizes(problem: Problem) -> Array:
@@ -250,7 +253,7 @@ def _slips(problem: Problem, found: dict[str, float]) -> Iterator[_Slip]:
     part = next(p for p in problem.parts if not p.record.reference)
     D = 2.0 * part.flow.R
     # loads go with D^4 and D^5 (coefficients stay): least squares over what was measured
-    powers = {c: p for c, p in ((T, 4.0), (Q, 5.0)) if c in found}
+    powers = {c: p for c, p in zip((T, Q), _POWERS, strict=True) if c in found}
     k = sum(p * found[c] for c, p in powers.items()) / sum(p * p for p in powers.values())
     twice, half = abs(k - math.log(2.0)) < 0.1, abs(k + math.log(2.0)) < 0.1
     hint = ", the case has the radius as diameter" if twice else ", the case has twice the diameter" if half else ""

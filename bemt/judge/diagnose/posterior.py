@@ -139,7 +139,8 @@ def weigh(
     bank = _Bank.of(problem, candidates)
     rivals = noise.rivals(problem, _told(candidates))
     other = Another.of(problem)
-    other = other if other and other[0].ids.isdisjoint(gone) else None
+    if other is not None and other[0].ids & set(gone):
+        other = None
     states = []
     for h in _leading(bank):
         C = noise.covariance(problem, h)
@@ -154,7 +155,7 @@ def weigh(
                 share = float(log_sum(gains[some])) - float(np.log(gains.size)) if some.any() else _SHUT
                 where[UNKNOWN] = state.log_z[NONE] + share
         if other is not None:
-            state.log_z[other[0]] = state.log_z[NONE] + other[1].log_bayes(state.white, state.r)
+            state.log_z[other[0]] = state.log_z[NONE] + other[1].log_bayes(state.white, state.r, problem.channel)
         if pairs:
             _pairs(bank, state)
         states.append(state)

@@ -72,7 +72,8 @@ class Given:
     # Files
     recordings: tuple[str, ...] = ("RECORDING",)
     references: tuple[str, ...] = ()
-    rest: str = "--case CASE"  # Options
+    case: str = "--case CASE"
+    rest: str = ""  # Other options
     ruled_out: tuple[str, ...] = ()  # Effects that a check has ruled out
     changed: tuple[str, ...] = ()  # Effects that the user says he changed
     stated: Mapping[str, Sequence[str]] = field(default_factory=dict)  # Of the columns: unit, column and sign
@@ -82,8 +83,9 @@ class Given:
         files = [*self.recordings, *([run] if run else [])]
         known = [*self.references, *([reference] if reference else [])]
         gone = [*self.ruled_out, *([ruled_out] if ruled_out else [])]
-        words = ["bemt diagnose", *files, *(["--reference", *known] if known else []), self.rest]
-        said = [*options_of(self.stated), *(["--changed", *self.changed] if self.changed else [])]
+        words = ["bemt diagnose", *files, *(["--reference", *known] if known else []), self.case]
+        changed = ["--changed", *self.changed] if self.changed else []
+        said = [*([self.rest] if self.rest else []), *options_of(self.stated), *changed]
         return " ".join([*words, *said, *(["--ruled-out", *gone] if gone else [])])
 
     def comparison(self, reference: str) -> str:
