@@ -45,6 +45,8 @@ from bemt.physics.effects.unit_slip import UnitSlip
 from bemt.physics.effects.untwist import Untwist
 from bemt.physics.effects.zero import ThrustZero
 from bemt.physics.sections.polars import ALPHA_GRID, ExtrapolatedTable, Polar, from_tables, linear_polar
+from bemt.rotors.case.load import load_case
+from bemt.rotors.case.prepare import prepare_case
 from geometry.laws import helix
 from geometry.rotor import Rotor
 
@@ -513,58 +515,61 @@ def test_inflow_lag_matches_blades_at_frozen_inflow() -> None:
 # ---- duct and blade
 
 
-def ducted(load: list[float], **extra: Array) -> tuple[Flow, Loads]:
-    T_duct = np.array(load)
-    flow = dataclasses.replace(recorded([6000.0] * T_duct.size, **extra), ducted=True)
-    return flow, Loads(flow.T0 + T_duct, flow.Q0.copy(), T_duct)
+def mouth(thrust: list[float], V: float | list[float] = 0.0, **extra: Array) -> Flow:
+    """Points of a ducted rotor whose baseline has this thrust."""
+    flow = dataclasses.replace(recorded([6000.0] * len(thrust), **extra), ducted=True)
+    return dataclasses.replace(flow, V=np.broadcast_to(np.asarray(V, float), flow.rpm.shape), T0=np.array(thrust))
 
 
 def test_the_lip_separates_above_its_limit_only() -> None:
-    flow, found = ducted([1.0, 6.0, 8.0, 10.0])
-    T0, Q0 = found.T.copy(), found.Q.copy()
-    LipSeparation(onset=0.6, loss=0.5).loads(found, flow)
-    np.testing.assert_allclose(T0 - found.T, [0.0, 0.0, 0.5 * 0.5 * 8.0, 0.5 * 10.0], atol=1e-12)
-    np.testing.assert_allclose(found.T_duct, [1.0, 6.0, 6.0, 5.0])
-    assert np.array_equal(found.Q, Q0)
+    flow = mouth([1.0, 6.0, 8.0, 10.0])
+    np.testing.assert_allclose(LipSeparation(onset=0.6, loss=0.5).share(flow), [0.0, 0.0, 0.25, 0.5], atol=1e-12)
     assert LipSeparation().applies(recorded([6000.0])) == "the rotor has no duct"
-    flow, found = ducted([1.0, 3.0, 4.0, 10.0])
-    T0 = found.T.copy()
-    LipSeparation(onset=0.2, loss=0.5, width=1.0).loads(found, flow)  # whole from twice the onset
-    np.testing.assert_allclose(T0 - found.T, [0.0, 0.25 * 3.0, 0.5 * 4.0, 0.5 * 10.0], atol=1e-12)
+    bit_by_bit = LipSeparation(onset=0.2, loss=0.5, width=1.0)  # whole from twice the onset
+    np.testing.assert_allclose(bit_by_bit.share(mouth([1.0, 3.0, 4.0, 10.0])), [0.0, 0.25, 0.5, 0.5], atol=1e-12)
 
 
 def test_the_lip_by_advance_separates_at_rest_first() -> None:
-    flow, found = ducted([4.0, 4.0, 4.0], V=[0.0, 10.0, 20.0])
-    T0 = found.T.copy()
-    LipSeparation(onset=0.25, loss=0.4, by="advance").loads(found, flow)
-    lost = T0 - found.T
-    assert lost[0] == pytest.approx(0.4 * 4.0)
+    lost = LipSeparation(onset=0.25, loss=0.4, by="advance").share(mouth([4.0] * 3, [0.0, 10.0, 20.0]))
+    assert lost[0] == pytest.approx(0.4)
     assert np.all(np.diff(lost) < 0.0)
-    flow, found = ducted([4.0, 8.0])  # at rest an inviscid flow loses the same share at any load
-    LipSeparation(onset=0.9, loss=0.4, by="advance").loads(found, flow)
-    np.testing.assert_allclose(found.T_duct, [0.6 * 4.0, 0.6 * 8.0])
+    # at rest an inviscid flow loses the same share at any load
+    np.testing.assert_allclose(LipSeparation(onset=0.9, loss=0.4, by="advance").share(mouth([4.0, 8.0])), 0.4)
 
 
 def test_the_lip_by_turning_is_that_of_a_straight_duct() -> None:
-    # momentum: thrust rho A Ve (Ve - V) at jet speed Ve, of which the rotor's is rho A (Ve^2 - V^2) / 2
-    flow, _ = ducted([0.0] * 3, V=[0.0, 8.0, 16.0])
-    jet = np.array([20.0, 20.0, 16.0])
-    mass = flow.rho * flow.area
-    rotor, whole = 0.5 * mass * (jet**2 - flow.V**2), mass * jet * (jet - flow.V)
-    found = Loads(whole.copy(), flow.Q0.copy(), whole - rotor)
-    np.testing.assert_allclose(whole - rotor, 0.5 * mass * (jet - flow.V) ** 2, atol=1e-12)
-    LipSeparation(onset=0.01, loss=0.6, width=1.0, by="turning").loads(found, flow)
-    np.testing.assert_allclose(whole - found.T, 0.6 * (whole - rotor), atol=1e-9)
-    assert np.array_equal(found.Q, flow.Q0)
+    # momentum: thrust rho A Ve (Ve - V) at jet speed Ve, which turns Ve - V into the mouth
+    V, jet = np.array([0.0, 8.0, 16.0]), np.array([20.0, 20.0, 20.0])
+    one = recorded([6000.0])
+    flow = mouth(list(float(one.rho[0] * one.area) * jet * (jet - V)), list(V))
+    share = LipSeparation(onset=0.01, loss=1.0, width=99.0, by="turning").share(flow)
+    turned = ((jet - V) / jet) ** 2
+    np.testing.assert_allclose(share, (turned - 0.01) / 0.99, atol=1e-9)
 
 
 def test_the_lip_remembers() -> None:
-    up_down = [2.0, 5.5, 8.0, 10.0, 8.0, 5.5, 2.0]
-    flow, found = ducted(up_down, time_s=np.arange(7.0))
-    LipSeparation(onset=0.6, loss=0.5, hysteresis=0.2).loads(found, flow)
-    lost = np.array(up_down) - found.T_duct
+    lost = LipSeparation(onset=0.6, loss=0.5, hysteresis=0.2).share(
+        mouth([2.0, 5.5, 8.0, 10.0, 8.0, 5.5, 2.0], time_s=np.arange(7.0))
+    )
     assert lost[1] == 0.0 < lost[5] and lost[0] == lost[6] == 0.0
     assert lost[2] == pytest.approx(lost[4])
+
+
+def test_a_separated_lip_is_one_that_loses_as_much_head() -> None:
+    """Less flow: less thrust and more torque, the same as of a duct whose own lip loses that, at rest and in flight."""
+    fan = prepare_case(load_case("cases/ds30"))
+    assert fan.duct is not None
+    V = np.array([0.0, 10.0, 20.0])
+    flow = bem.flow_of(fan.prep, 30000.0, V, Air.from_density(1.2))
+    lip = LipSeparation(onset=0.01, loss=0.3, width=0.01, by="advance")
+    apart, _, ok = bem.respond(fan.prepared, (*fan.effects, lip), flow)
+    lossy = dataclasses.replace(fan, duct=dataclasses.replace(fan.duct, lip_loss=fan.duct.lip_loss + 0.3))
+    same = lossy.solve(30000.0, V, Air.from_density(1.2))
+    assert ok.all()
+    np.testing.assert_allclose(apart.T, same.thrust_N, rtol=3e-3)
+    np.testing.assert_allclose(apart.Q, same.torque_Nm, rtol=3e-3)
+    np.testing.assert_allclose(apart.T_duct, same.duct_thrust_N, rtol=2e-2)
+    assert np.all(apart.T < flow.T0) and np.all(apart.Q > flow.Q0)
 
 
 def test_untwist_is_measured_at_the_hardest_point() -> None:

@@ -251,17 +251,13 @@ def _leading(bank: _Bank) -> list[Hyper]:
 
 
 def _few(bank: _Bank) -> NDArray[np.intp]:
-    """Columns that stand for each candidate, evenly chosen; of exact ratios those nearest to the readings."""
+    """Columns that stand for each candidate: those nearest to the readings, and evenly chosen ones."""
     out = []
     rough = np.hypot(bank.problem.u, 0.03 * bank.problem.scale)[:, None]
     for c in bank.candidates:
-        span, cls = bank.spans[c.id], effects.catalogue()[c.id]
-        if cls.kind == "stand" and cls.discrete:
-            apart = np.sum(((bank.problem.residual[:, None] - c.signatures) / rough) ** 2, axis=0)
-            chosen = np.argsort(apart, kind="stable")[:_FEW]
-        else:
-            chosen = np.unique(np.linspace(0, c.weight.size - 1, _FEW).round().astype(int))
-        out.append(span.start + np.sort(chosen))
+        apart = np.sum(((bank.problem.residual[:, None] - c.signatures) / rough) ** 2, axis=0)
+        even = np.linspace(0, c.weight.size - 1, _FEW).round().astype(int)
+        out.append(bank.spans[c.id].start + np.union1d(even, np.argsort(apart, kind="stable")[:_FEW]))
     return np.concatenate([np.zeros(0, dtype=np.intp), *out])
 
 

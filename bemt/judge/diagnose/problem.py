@@ -79,6 +79,11 @@ class Part:
     _solved: dict[tuple[Effect, ...], tuple[Array, Array, Flow]] = field(default_factory=dict, repr=False)
 
     @cached_property
+    def _same_flow(self) -> dict[Any, Any]:
+        """Solutions of the model at the recorded flow."""
+        return {}
+
+    @cached_property
     def missing(self) -> frozenset[str]:
         """Physics of every rotor that the case switches off: no run is without it, a reference neither."""
         return frozenset(self.left_out) & {e.id for e in effects.standard()}
@@ -109,7 +114,9 @@ class Part:
     def _respond(self, effects: Sequence[Effect]) -> tuple[Array, Array, Flow]:
         """Thrust [N] and torque [N m] with a set of effects, NaN where not converged, and the flow that is met."""
         model = self._whole if self._far(effects) else self.model
-        loads, met, ok = bem.respond(model.prepared, effects, self.flow)
+        loads, met, ok = bem.respond(
+            model.prepared, effects, self.flow, self._same_flow if model is self.model else None
+        )
         nan = np.where(ok, 1.0, np.nan)
         return loads.T * nan, loads.Q * nan, met
 

@@ -310,6 +310,7 @@ def _solve(
 
     induced = 0.06 * omega * R + 0.0 * airspeed
     jet = 2.0 * induced
+    left = np.ones_like(rpm)  # of the rotor's head, behind the lip
     gamma = np.zeros(shape)
     if start is not None:
         gamma, induced = start.circulation.copy(), start.induced.copy()
@@ -329,7 +330,7 @@ def _solve(
             # it replaces the mean of the open wake's tube
             share = (B * dr * r / np.sum(dr * r))[None, :] / (2.0 * np.pi)
             per_w = np.asarray(extra["duct"])[None, :, None]
-            ma = ma + (share * (omega / np.maximum(airspeed + 0.5 * jet, 1e-3))[:, None])[:, None, :] * per_w
+            ma = ma + (share * (omega * left / np.maximum(airspeed + 0.5 * jet, 1e-3))[:, None])[:, None, :] * per_w
             ma = ma - 0.5 * (share / (h * R)[:, None])[:, None, :]
         ma = ma * factor[:, :, None]
         ua, ut, wa, wt, w, cl, _cd, alpha = section(gamma, ma, ms)
@@ -349,7 +350,11 @@ def _solve(
         fresh = np.sum(ua * weights, axis=1) / np.sum(weights, axis=1)
         if ducted:
             head = B * omega / np.pi * np.sum(gamma * r * dr, axis=1) / np.sum(r * dr)
-            jet = jet + 0.5 * (np.sqrt(np.maximum(airspeed**2 + head, 0.0)) - airspeed - jet)
+            if "lip" in extra:
+                mouth = np.maximum(np.sum((va + ua) * r * dr, axis=1) / np.sum(r * dr) - airspeed, 0.0)
+                lost = extra["lip"] / (1.0 + np.exp(-(mouth**2 / extra["lip_bears"] - 4.0) / 0.6))
+                left = left + 0.5 * (1.0 / (1.0 + lost * mouth**2 / np.maximum(left * head, 1e-9)) - left)
+            jet = jet + 0.5 * (np.sqrt(np.maximum(airspeed**2 + left * head, 0.0)) - airspeed - jet)
         drift = np.abs(fresh - induced) / (omega * R)
         induced = np.maximum(induced + 0.7 * (fresh - induced), -0.4 * np.maximum(airspeed, 0.0))
         change = now

@@ -205,7 +205,7 @@ class World:
     untwist: float = 0.0
     untwist_at: float = 1.0  # rho Omega^2 where the tip turns by ``untwist``. [kg/m3/s2]
     leak: float = 1.0  # Scale of the leakage over the tips of a ducted rotor, 1 is real. [-]
-    lip: float = 0.0  # Scale of the loss of duct thrust behind a lip that separates. [-]
+    lip: float = 0.0  # Head that an inlet loses behind its lip once that has separated, over 1/2 rho (w - V)^2. [-]
     ground: float = 0.0  # Scale of the images of the wake in a wall behind the rotor, 1 is real. [-]
     # Onset speed over induced speed when the room has been stirred up for long; time to half of it. [-], [s]
     recirculation: float = 0.0
@@ -316,6 +316,10 @@ def loads(
         gap = np.where(np.isfinite(c.gap), c.gap, duct.gap * rotor.radius) / span
         leak = world.leak * gap
         extra |= {"duct": per_w, "seal": seal(gap, world.leak)}
+        if world.lip:
+            # suction peak over head of the lip, with the flow that turns into the mouth; separates gradually above 4
+            bears = np.full(c.rpm.size, 240.0 * duct.lip_radius)
+            extra |= {"lip": np.full(c.rpm.size, world.lip), "lip_bears": bears}
     if world.ground and np.any(np.isfinite(c.wall)):
         extra["induction"] = 1.0 + world.ground * (_wall_factor(rotor.x, c.wall / rotor.radius) - 1.0)
     along = c.airspeed * np.cos(np.radians(world.oblique))
@@ -343,7 +347,7 @@ def loads(
     answer = how(rotor, c, pressure, world, extra, start)
     thrust, torque = answer.thrust, answer.torque
     if duct is not None:
-        thrust = (thrust + _shroud(rotor, duct, world, rho, along, per_v, answer)) * (1.0 - 1.3 * leak)
+        thrust = (thrust + _shroud(rotor, duct, rho, along, per_v, answer)) * (1.0 - 1.3 * leak)
         torque = torque * (1.0 - 0.5 * leak)
     if world.nacelle_cd:
         slip = along + 2.0 * np.maximum(np.nan_to_num(answer.induced), 0.0)
@@ -359,20 +363,14 @@ def loads(
 
 
 def _shroud(
-    rotor: truth.TruthRotor, duct: TruthDuct, world: World, rho: Array, along: Array, per_v: Array,
-    answer: truth.TrueAnswer,
-) -> Array:  # fmt: skip
+    rotor: truth.TruthRotor, duct: TruthDuct, rho: Array, along: Array, per_v: Array, answer: truth.TrueAnswer
+) -> Array:
     """Thrust of the duct alone: that of the mass flow, less the blades' and the friction."""
     ring = rotor.x * np.diff(rotor.edges)
     through = np.sum((along[:, None] * (1.0 + per_v) + answer.ua) * ring, axis=1) / np.sum(ring)
     whole = rho * (np.pi * rotor.radius**2) * (1.0 - rotor.hub**2) * through * answer.jet
     skin = 0.5 * rho * (0.006 * 2.0 * np.pi * rotor.radius**2 * duct.length) * (through**2 + along**2)
-    shroud = whole - answer.thrust - skin
-    if world.lip:
-        # suction peak over head of the lip, with the flow that turns into the mouth; separates gradually above 4
-        turn = np.maximum(through - along, 0.0) ** 2 / (2.0 * duct.lip_radius) / np.maximum(120.0, 1e-9)
-        shroud = shroud * (1.0 - 0.6 * world.lip / (1.0 + np.exp(-(turn - 4.0) / 0.6)))
-    return np.asarray(shroud)
+    return np.asarray(whole - answer.thrust - skin)
 
 
 def _two_stage_lag(time: Array, target: Array, lag: float) -> Array:

@@ -308,13 +308,15 @@ def flow_of(
     return flow
 
 
-def respond(prepared: Callable[[Sequence[Effect], float], solver.Prepared], effects: Sequence[Effect], flow: Flow
-            ) -> tuple[Loads, Flow, NDArray[np.bool_]]:  # fmt: skip
+def respond(
+    prepared: Callable[[Sequence[Effect], float], solver.Prepared], effects: Sequence[Effect], flow: Flow,
+    known: dict[tuple[tuple[Effect, ...], float], solver.Solution] | None = None,
+) -> tuple[Loads, Flow, NDArray[np.bool_]]:  # fmt: skip
     """Loads at points with all effects on, the flow that the rotor meets, (P,) bool converged; ``flow`` stays as it is.
 
     ``prepared`` gives a rotor for effects and a level (:meth:`Model.prepared`).  An effect of the solver whose size
     differs between points (:meth:`Effect.share`) is solved at levels 0, 1/2 and 1 and interpolated by the parabola
-    through them; several of them add up.
+    through them; several of them add up.  ``known`` keeps solutions at the flow as it is.
     """
     met = replace(flow, **{k: getattr(flow, k).copy() for k in ("rpm", "V", "rho", "mu", "a_sound")})
     # what instruments got wrong first: a wrong airspeed is that of the tunnel, not what a wall makes of it
@@ -323,13 +325,22 @@ def respond(prepared: Callable[[Sequence[Effect], float], solver.Prepared], effe
     shared = [(e, s) for e in effects if (s := e.share(met)) is not None]
     varying = [e for e, _ in shared]
     plain = [e for e in effects if e not in varying]
-    base = _solve(prepared(plain, 1.0), met)
+    kept = {} if known is None or any(_has(e, "flow") for e in effects) else known
+
+    def solved(some: Sequence[Effect], level: float) -> solver.Solution:
+        key = (tuple(e for e in some if acts_on_rotor(e)), level)
+        if key not in kept:
+            kept[key] = _solve(prepared(some, level), met)
+        return kept[key]
+
+    base = solved(plain, 1.0)
     T, Q, T_duct, ok = base.T, base.Q, base.T_duct, base.converged
     for e, share in shared:
-        half, whole = (_solve(prepared([*plain, e], level), met) for level in (0.5, 1.0))
+        half, whole = (solved([*plain, e.solved()], level) for level in (0.5, 1.0))
         w_half, w_whole = 4.0 * share * (1.0 - share), share * (2.0 * share - 1.0)
         T = T + w_half * (half.T - base.T) + w_whole * (whole.T - base.T)
         Q = Q + w_half * (half.Q - base.Q) + w_whole * (whole.Q - base.Q)
+        T_duct = T_duct + w_half * (half.T_duct - base.T_duct) + w_whole * (whole.T_duct - base.T_duct)
         ok = ok & half.converged & whole.converged
     loads = Loads(T.copy(), Q.copy(), T_duct.copy())
     for e in effects:

@@ -272,7 +272,7 @@ def _numbers(bake: RotorBuild, duct: DuctFlow | None) -> Array:
         num[res.N_LEFT] = duct.nose_capture / duct.contraction
         num[res.N_LENGTH] = duct.length
         num[res.N_WALL] = duct.wall_loss
-        num[res.N_LIP] = duct.lip_loss
+        num[res.N_LIP] = duct.lip_loss + n.lip_loss
         num[res.N_STATOR] = duct.stator
         num[res.N_GAP] = n.gap_share
         num[res.N_LEAK] = n.gap_loss

@@ -109,6 +109,8 @@ class KernelNumbers:
         Ducted rotor: share of the open tip loss, 0 (sealed) to 1 [1].
     gap_loss : float
         Ducted rotor: share of the blade force lost through the gap [1].
+    lip_loss : float
+        Ducted rotor: what the lip loses besides what the duct says, over 1/2 rho (w - V)^2 [1].
     cone : float
         Coning angle of blades on flapping hinges, NaN: stiff blades [rad].
     """
@@ -120,6 +122,7 @@ class KernelNumbers:
     bridge: float = 0.0
     gap_share: float = 0.0
     gap_loss: float = 0.0
+    lip_loss: float = 0.0
     cone: float = float("nan")
 
 
@@ -545,6 +548,10 @@ class Effect:
             Between 0 and 1: the ``level`` at which the solver hooks act; None: 1 everywhere [1].
         """
         return None
+
+    def solved(self) -> Effect:
+        """Effect whose solver hooks stand for this one's where :meth:`share` tells the rest; itself by default."""
+        return self
 
     def applies(self, flow: Flow) -> str:
         """Reason why the effect cannot be present in a recording, "" if it can.
