@@ -100,8 +100,7 @@ def _factored(found: posterior.Evidence, pair: RunChange) -> dict[Explanation, f
 
     A ratio of pole pairs moves the speeds apart itself, a unit the loads.
     """
-    propeller = Explanation.of("propeller")
-    P = knowledge.another_rotor(found.probability, propeller if propeller in found.probability else UNKNOWN)
+    P = found.probability
     if pair.by_proxy:  # the losses of a motor are something smooth that is no cause
         P = {**P, UNKNOWN: 0.0, DOUBT: P[UNKNOWN]}
     if pair.turned:  # nothing but the cell or the sense of rotation turns thrust round

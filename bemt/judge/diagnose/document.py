@@ -18,7 +18,7 @@ from bemt.judge.diagnose.form import nearest
 from bemt.judge.diagnose.posterior import LEAST
 from bemt.judge.diagnose.record import DROPPED, NO_SPEED
 from bemt.judge.diagnose.suggest import LEVEL
-from bemt.judge.explanation import NONE, UNKNOWN, Explanation, Size
+from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation, Size
 from bemt.physics import effects
 from bemt.physics.effects.propeller import AnotherPropeller
 
@@ -41,8 +41,6 @@ _VARIABLE = {
 }  # fmt: skip
 _SHOWN = 8
 _FINDINGS = 3
-# All loads off the case by more than this share: first the question whether it is the rotor of the case.
-_ANOTHER_ROTOR = 0.25
 # Members from which on a class is said as a group.
 _A_GROUP = 5
 # Least probability of a guess.
@@ -223,9 +221,11 @@ def explanation(d: Diagnosis) -> list[str]:
     )
     alone, doubted = d.problem.free.all(), other_rotor.doubted(d.problem, decision)
     open_ = alone and decision.verdict in ("insufficient", "unknown") and not d.problem.findings
-    far = open_ and level and min(abs(v) for v in level.values()) > _ANOTHER_ROTOR and not doubted
-    if far or doubted or decision.effects[:1] == (AnotherPropeller.id,):
-        lead = f"Your rotor is far from the case ({off}). Check diameter, pitch and blades first. " if far else ""
+    # the readings speak for another rotor than the case's
+    speaks = d.found.probability.get(DOUBT, 0.0) > d.found.prior.get(DOUBT, 1.0)
+    likelier = open_ and level and speaks and not doubted
+    if likelier or doubted or decision.effects[:1] == (AnotherPropeller.id,):
+        lead = f"The loads are off the case ({off}): are diameter, pitch and blades its own? " if likelier else ""
         lines.append(f"{lead}Nearest rotors: {other_rotor.nearest_rotors(d.problem)}.")
     if decision.verdict == "none":
         lines.append(f"Why: {decision.why}.")

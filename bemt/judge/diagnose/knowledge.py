@@ -130,10 +130,6 @@ many ratios fit in between [1]."""
 DOUBTFUL = 9.0
 """Odds that a file which cannot be right, or loads of a factor of three, are a fault of file or case before any physics
 [1]."""
-ANOTHER = 50.0
-"""Odds of another rotor over two faults at once that each shift a whole channel: as of one cause over two [1]."""
-# Faults of a cell that multiply its reading.
-_SHARES = ("gain", "cross-talk")
 _LOADS = {"thrust_N": "thrust", "torque_Nm": "torque"}
 
 
@@ -171,7 +167,7 @@ def combined(found: Evidence, change: RunChange | None = None) -> dict[Explanati
     P = {k: p / sum(odds.values()) for k, p in odds.items()}
     if change is not None and change.loads.ranked:
         P = both(P, change.loads.ranked)
-    return _doubted(found.problem, another_rotor(P, UNKNOWN))
+    return _doubted(found.problem, P)
 
 
 def both(P: Mapping[Explanation, float], laws: Mapping[Explanation, float]) -> dict[Explanation, float]:
@@ -196,18 +192,6 @@ def reason(problem: Problem, said: Decision) -> Decision:
         if said.effects == (name,):
             return replace(said, why=f"{finding.evidence}, by definition")
     return said
-
-
-def another_rotor(P: Mapping[Explanation, float], rotor: Explanation) -> dict[Explanation, float]:
-    """Two effects that only shift whole channels fit any two levels: another ``rotor`` does that, too."""
-
-    def level(i: str) -> bool:
-        cls = effects.catalogue()[i]
-        return cls.exact or (cls.fault in _SHARES and cls.sensor in ("", *_LOADS))
-
-    share = ANOTHER / (1.0 + ANOTHER)
-    lost = {k: share * p for k, p in P.items() if k.pair and all(map(level, k))}
-    return {k: p - lost.get(k, 0.0) + (sum(lost.values()) if k == rotor else 0.0) for k, p in P.items()}
 
 
 def _doubted(problem: Problem, P: Mapping[Explanation, float]) -> dict[Explanation, float]:
