@@ -24,8 +24,8 @@ class LipSeparation(Effect):
     Pereira (2008), PhD thesis Univ. of Maryland, ch. 4 (not checked).
 
     The lip holds up to ``onset``, a share of the largest thrust of the recording, and is separated from 1 + ``width``
-    times it on (0: at the largest). Hysteresis is declared: once separated, the flow reattaches below
-    onset (1 - hysteresis), visible only if the recording has time.
+    times it on (0: at the largest); without a recording it is separated. Hysteresis is declared: once separated, the
+    flow reattaches below onset (1 - hysteresis), visible only if the recording has time.
 
     A lip also stalls because of the flow direction, at any load: the stagnation point moves outside as the velocity
     ratio V / w of the inlet falls, and the suction peak is sharpest at rest (Kuchemann and Weber 1953, Aerodynamics
@@ -64,14 +64,14 @@ class LipSeparation(Effect):
         return "" if flow.ducted else "the rotor has no duct"
 
     def momentum(self, bake: RotorBuild) -> None:
-        """Lose a whole head, of which `share` takes its part."""
+        """Lose the head."""
         if bake.ducted:
-            bake.num.lip_loss += bake.level
+            bake.num.lip_loss += bake.level * self.loss
             bake.level = 1.0
 
     def solved(self) -> LipSeparation:
-        """All settings are shares of one."""
-        return LipSeparation()
+        """One that loses a whole head: all settings are shares of it."""
+        return LipSeparation(loss=1.0)
 
     def share(self, flow: Flow) -> Array:
         """Head that is lost at each point."""
@@ -103,7 +103,7 @@ class LipSeparation(Effect):
         return 1.0 / sum(v["by"] == self.by for v in _variants())
 
     def variants(self) -> tuple[dict[str, str | float], ...]:
-        """Onsets and losses in ratio: by the load with hysteresis, by V/V_i, by turning at once and bit by bit."""
+        """Onsets and losses, at once and bit by bit: by the load, with hysteresis too, by V/w, by turning."""
         return _variants()
 
 
