@@ -83,7 +83,7 @@ def draw(found: Counter[tuple[str, str]]) -> None:
     """The picture: wings from the doors down, one lane for the imports of each."""
     plt.rcParams |= {"svg.fonttype": "none", "svg.hashsalt": "wings", "font.family": "sans-serif"}
     fig, ax = plt.subplots(figsize=(9.5, 8.2))
-    tools = sorted(path.name for path in (ROOT / "bemt" / "tools").iterdir() if (path / "offers.py").is_file())
+    tools = sorted(path.name for path in (ROOT / "bemt" / "tools").iterdir() if (path / "__init__.py").is_file())
     inner = {"tools": tools, "physics": ["dataset", "sections", "effects", "bem"], "data": ["readers", "recordings"],
              "judge": ["compare", "diagnose", "proof"], "results": ["sweep", "report"]}  # fmt: skip
     width, y = 5.2, {name: -1.25 * i for i, name in enumerate(ORDER)}

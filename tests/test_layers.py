@@ -121,7 +121,8 @@ HEAVY = {
 }  # fmt: skip
 LIGHT = "|".join((
     "bemt|bemt.__main__|bemt.app|bemt.app.cli|bemt.app.face|bemt.app.registry|bemt.app.registry",
-    "bemt.base|bemt.base.action|bemt.base.errors|bemt.base.plugins", "bemt.*.actions|bemt.*.import_files|bemt.*.offers",
+    "bemt.base|bemt.base.action|bemt.base.errors|bemt.base.plugins", "bemt.*.actions|bemt.*.import_files",
+    *(f"bemt.tools.{tool}" for tool in ("cfd", "design", "drive", "exports", "flight", "stand")),  # what they offer
 ))  # fmt: skip  # --help: standard library only
 
 FILE_CALLS = {

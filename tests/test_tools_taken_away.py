@@ -84,7 +84,7 @@ def whole(project: Path) -> tuple[list[object], object]:
 
 
 def test_each_tool_of_the_package_is_known(project: Path) -> None:
-    folders = {path.parent.name for path in (project / "bemt" / "tools").glob("*/offers.py")}
+    folders = {path.parent.name for path in (project / "bemt" / "tools").glob("*/__init__.py")}
     assert folders == set(plugins.TOOLS) == set(CALLS)
 
 

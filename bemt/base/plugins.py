@@ -2,7 +2,7 @@
 
 Each folder of ``bemt/tools`` may be taken away: the rest runs on, and says what is missing where it is asked for.
 
-A tool is a package of ``bemt.tools`` with a module ``offers``. Its tables map a name to ``module:attribute``:
+A tool is a package of ``bemt.tools`` with tables that map a name to ``module:attribute``:
 
 * ``CASE_PARTS``: table of a case; the attribute takes a :class:`bemt.rotors.case.Case` that has it, and gives a
   document for the results;
@@ -40,10 +40,10 @@ CASE_TABLES = ("drive",)
 
 @cache
 def _tools() -> tuple[ModuleType, ...]:
-    """Module ``offers`` of every tool that is here."""
+    """Every tool that is here."""
     path = importlib.import_module("bemt.tools").__path__
     names = sorted(info.name for info in pkgutil.iter_modules(path) if info.ispkg)
-    return tuple(importlib.import_module(f"bemt.tools.{name}.offers") for name in names)
+    return tuple(importlib.import_module(f"bemt.tools.{name}") for name in names)
 
 
 def offered(table: str) -> dict[str, str]:

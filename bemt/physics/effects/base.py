@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import product
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -70,25 +71,6 @@ class Parameter:
         if self.usual is None or self.off is None:
             return 1.0
         return float((1.0 + ((value - self.off) / self.usual) ** 2 / 3.0) ** -2)
-
-
-def choice(name: str, value: str, lawful: tuple[str, ...]) -> None:
-    """Raise an error for a word that a field of an effect does not accept.
-
-    Parameters
-    ----------
-    name, value : str
-        Field and its value.
-    lawful : tuple of str
-        Accepted words.
-
-    Raises
-    ------
-    ValueError
-        If the word is not accepted.
-    """
-    if value not in lawful:
-        raise ValueError(f"{name}={value!r}; expected {', '.join(lawful)}")
 
 
 @dataclass(slots=True)
@@ -456,11 +438,18 @@ class Effect:
     check_in_room: ClassVar[bool] = False
     # Parameters with a few discrete values (such as a ratio of units).
     discrete: ClassVar[tuple[str, ...]] = ()
-    # Names in Flow.extra that are required to see it.
+    # Names in Flow.extra that are required to see it; whether airspeed is, or a duct; why it is not in one.
     needs: ClassVar[tuple[str, ...]] = ()
+    flies: ClassVar[bool] = False
+    needs_duct: ClassVar[bool] = False
+    in_duct: ClassVar[str] = ""
     # Whether a diagnosis may name it.
     diagnosed: ClassVar[bool] = True
+    # Words that a parameter of text may have.
+    words: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     parameters: ClassVar[tuple[Parameter, ...]] = ()
+    # Values of each parameter of which a diagnosis tries every combination, instead of the ranges.
+    tried: ClassVar[Mapping[str, tuple[Any, ...]]] = {}
     # Position among the section hooks: polars first (10), rotation (20), cascade (30), compressibility (40).
     order: ClassVar[int] = 50
     # Whether its tables need a Mach axis.
@@ -479,6 +468,12 @@ class Effect:
             raise TypeError(
                 f"{cls.__name__}: parameter {', '.join(hidden)} has the name of a hook; choose another name"
             )
+
+    def __post_init__(self) -> None:
+        """Refuse unknown words."""
+        for name, lawful in self.words.items():
+            if (value := getattr(self, name)) not in lawful:
+                raise ValueError(f"{name}={value!r}; expected {', '.join(lawful)}")
 
     def blade(self, bake: RotorBuild) -> None:
         """Change blade angles; does nothing by default."""
@@ -535,18 +530,7 @@ class Effect:
         """
 
     def share(self, flow: Flow) -> Array | None:
-        """Strength of the effect at each point of a recording, for solver effects that vary between points.
-
-        Parameters
-        ----------
-        flow : Flow
-            The points.
-
-        Returns
-        -------
-        (P,) float or None
-            Between 0 and 1: the ``level`` at which the solver hooks act; None: 1 everywhere [1].
-        """
+        """Strength at each point, (P,) from 0 to 1: the ``level`` of the solver hooks; None: 1 everywhere [1]."""
         return None
 
     def solved(self) -> Effect:
@@ -554,24 +538,21 @@ class Effect:
         return self
 
     def applies(self, flow: Flow) -> str:
-        """Reason why the effect cannot be present in a recording, "" if it can.
-
-        Parameters
-        ----------
-        flow : Flow
-            The points.
-
-        Returns
-        -------
-        str
-            Reason in words.
-        """
+        """Reason why the effect cannot be present in a recording, "" if it can."""
         missing = [name for name in self.needs if name not in flow.extra]
-        return f"the recording has no {', '.join(missing)}" if missing else ""
+        if missing:
+            return f"the recording has no {', '.join(missing)}"
+        if flow.ducted and self.in_duct:
+            return self.in_duct
+        if self.needs_duct and not flow.ducted:
+            return "the rotor has no duct"
+        return "no point has airspeed" if self.flies and not np.any(flow.V > 0.0) else ""
 
     def variants(self) -> tuple[dict[str, Any], ...] | None:
-        """Discrete settings that a diagnosis tries instead of the ranges of ``parameters``; None: use the ranges."""
-        return None
+        """Settings that a diagnosis tries instead of the ranges of ``parameters``; None: use the ranges."""
+        if not self.tried:
+            return None
+        return tuple(dict(zip(self.tried, values, strict=True)) for values in product(*self.tried.values()))
 
     def odds(self) -> float:
         """Prior odds of this setting among those of `variants`, over those of the commonest; 1 by default. [1]"""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.physics.effects.base import Array, Effect, Flow, Parameter, RotorBuild, choice
+from bemt.physics.effects.base import Array, Effect, Flow, Parameter, RotorBuild
 from bemt.physics.sections.row import row_shift, weinig_factor
 
 if TYPE_CHECKING:
@@ -64,15 +64,12 @@ class Cascade(Effect):
     sign = (
         "less thrust and less torque by shares that grow with solidity and barely depend on speed; solidity above 0.3"
     )
+    words = {"form": FORMS}
     parameters = (
         Parameter("zero_lift", "1", 0.0, 1.0, "1: the row's zero-lift angle; 0: the single section's", steps=0),
         Parameter("secondary", "1", 0.010, 0.030, "Howell 1945: 0.018", steps=0),
     )
     order = 30
-
-    def __post_init__(self) -> None:
-        """Refuse unknown forms."""
-        choice("form", self.form, FORMS)
 
     def applies(self, flow: Flow) -> str:
         """Blades far apart are single ones."""

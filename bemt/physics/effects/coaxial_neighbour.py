@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from bemt.physics.effects.base import Array, Effect, Flow, Parameter, choice
+from bemt.physics.effects.base import Array, Effect, Flow, Parameter
 from bemt.physics.wake import ahead, contracted, hover_gain, streamtubes
 
 _SIDES = ("upstream", "downstream")
@@ -49,19 +49,14 @@ class CoaxialNeighbour(Effect):
         "airspeed; gone when the other rotor stops"
     )
     check = "see whether a second rotor is on the axis; if so, repeat with it stopped"
+    words = {"side": _SIDES}
+    in_duct = "the rotor has a duct"
     parameters = (
         Parameter("z_over_R", "1", 0.1, 4.0, "coaxial stands, 0.1 to 1 diameters apart"),
         Parameter("load", "1", 0.0, 2.0, "declared; thrust of the neighbour over that of this rotor", 0, 0.0),
     )
+    tried = {"side": _SIDES, "z_over_R": (0.2, 0.4, 0.7, 1.2, 2.0, 4.0), "load": (0.5, 0.8, 1.0, 1.4)}
     on_by_default = False
-
-    def __post_init__(self) -> None:
-        """Refuse unknown sides."""
-        choice("side", self.side, _SIDES)
-
-    def applies(self, flow: Flow) -> str:
-        """The law is that of two open disks."""
-        return super().applies(flow) or ("the rotor has a duct" if flow.ducted else "")
 
     def flow(self, flow: Flow) -> None:
         """Add what the neighbour induces."""
@@ -101,13 +96,6 @@ class CoaxialNeighbour(Effect):
         flux = np.concatenate([[0.0], np.cumsum(np.diff(_OUTSIDE**2) * np.interp(middle, _OUTSIDE, outside))])
         upwash = v * edge**2 * np.interp(1.0 / edge, _OUTSIDE, flux) / np.maximum(1.0 - edge**2, 1e-9)
         return core, -upwash, share
-
-    def variants(self) -> tuple[dict[str, str | float], ...]:
-        """Both sides, six distances and four loads in ratio."""
-        return tuple(
-            {"side": side, "z_over_R": z, "load": k}
-            for side in _SIDES for z in (0.2, 0.4, 0.7, 1.2, 2.0, 4.0) for k in (0.5, 0.8, 1.0, 1.4)
-        )  # fmt: skip
 
 
 @lru_cache(maxsize=64)

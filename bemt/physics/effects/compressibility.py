@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bemt.physics.effects.base import Array, Effect, Parameter, RotorBuild, choice
+from bemt.physics.effects.base import Array, Effect, Parameter, RotorBuild
 
 FORMS = ("prandtl_glauert", "karman_tsien")
 # Lift grows a little beyond drag divergence, then the shock stalls the section within this span of Mach number.
@@ -41,17 +41,15 @@ class Compressibility(Effect):
     sign = (
         "thrust coefficient grows as 1 + M^2/2 of the tip; depends on air temperature at the same speed, not on density"
     )
+    words = {"form": FORMS}
     parameters = (
         Parameter("amplitude", "1", 0.6, 1.4, "1 is the published form; those differ by a fifth", 5, 0.0),
         Parameter("kappa", "1", 0.80, 0.95, "0.87 NACA sections, 0.95 supercritical (Mason 1990)", 0),
         Parameter("shock_stall", "1", 0.6, 0.9, "declared; NACA 0012 tables at M 0.85-0.95", 0),
     )
+    tried = {"form": FORMS, "amplitude": (0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 1.0, 1.1, 1.2, 1.3, 1.4)}
     uses_mach = True
     order = 40
-
-    def __post_init__(self) -> None:
-        """Refuse unknown forms."""
-        choice("form", self.form, FORMS)
 
     def section(self, bake: RotorBuild) -> None:
         """Scale lift by Mach number."""
@@ -96,8 +94,3 @@ class Compressibility(Effect):
         rise = np.clip((M - 1.0) / 0.1, 0.0, 1.0)
         ratio = np.where(M < 1.0, sub, sub + (ackeret - sub) * rise) if np.any(M >= 1.0) else sub
         return np.asarray(1.0 + self.amplitude * (ratio - 1.0))
-
-    def variants(self) -> tuple[dict[str, str | float], ...]:
-        """Both forms at eleven amplitudes."""
-        sizes = (0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 1.0, 1.1, 1.2, 1.3, 1.4)
-        return tuple({"form": f, "amplitude": a} for f in FORMS for a in sizes)

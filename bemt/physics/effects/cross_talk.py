@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bemt.physics.effects.base import Effect, Flow, Parameter, Reading, choice
+from bemt.physics.effects.base import Effect, Flow, Parameter, Reading
 
 FORMS = ("torque_in_thrust", "thrust_in_torque")
-_SIZES = tuple(k / 100.0 for k in range(-20, 21) if k)
 
 
 @dataclass(frozen=True)
@@ -30,12 +29,10 @@ class CrossTalk(Effect):
     sign = "one channel follows the load of the other over advance ratio; the sign reverses with the sense of rotation"
     kind = "stand"
     fault = "cross-talk"
+    words = {"form": FORMS}
     parameters = (Parameter("k", "1", -0.2, 0.2, "declared, arm error of R/20, seldom R/5", off=0.0, usual=0.05),)
+    tried = {"form": FORMS, "k": tuple(k / 100.0 for k in range(-20, 21) if k)}
     on_by_default = False
-
-    def __post_init__(self) -> None:
-        """Refuse unknown forms."""
-        choice("form", self.form, FORMS)
 
     def reading(self, reading: Reading, flow: Flow) -> None:
         """Add the share of the other load."""
@@ -44,7 +41,3 @@ class CrossTalk(Effect):
             reading.values["thrust_N"] = T + self.k * Q / flow.R
         else:
             reading.values["torque_Nm"] = Q + self.k * T * flow.R
-
-    def variants(self) -> tuple[dict[str, str | float], ...]:
-        """Both directions at forty sizes."""
-        return tuple({"form": f, "k": k} for f in FORMS for k in _SIZES)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bemt.physics.effects.base import Array, Effect, Parameter, RotorBuild, choice
+from bemt.physics.effects.base import Array, Effect, Parameter, RotorBuild
 
 FORMS = ("lock", "cubic")
 
@@ -34,13 +34,11 @@ class DragDivergence(Effect):
     sign = (
         "torque rises sharply above one tip Mach number, thrust barely moves; Reynolds number would act at every speed"
     )
+    words = {"form": FORMS}
     parameters = (Parameter("kappa", "1", 0.80, 0.95, "0.87 NACA sections, 0.95 supercritical (Mason 1990)", 5),)
+    tried = {"form": FORMS, "kappa": (0.80, 0.825, 0.85, 0.87, 0.89, 0.92, 0.95)}
     uses_mach = True
     order = 45
-
-    def __post_init__(self) -> None:
-        """Refuse unknown forms."""
-        choice("form", self.form, FORMS)
 
     def section(self, bake: RotorBuild) -> None:
         """Add wave drag."""
@@ -65,7 +63,3 @@ class DragDivergence(Effect):
             return np.asarray(20.0 * square**2)
         excess = np.maximum(above + (0.002 / 10.0) ** (1.0 / 3.0), 0.0)
         return np.asarray(10.0 * excess * excess**2)
-
-    def variants(self) -> tuple[dict[str, str | float], ...]:
-        """Both laws at seven technology factors."""
-        return tuple({"form": f, "kappa": k} for f in FORMS for k in (0.80, 0.825, 0.85, 0.87, 0.89, 0.92, 0.95))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.physics.effects.base import Array, Effect, Flow, Parameter, Reading, choice
+from bemt.physics.effects.base import Array, Effect, Flow, Parameter, Reading
 
 TARED = ("run", "once")
 
@@ -31,16 +31,13 @@ class Drift(Effect):
     along = ("time_s",)
     kind = "stand"
     fault = "drift"
+    words = {"tared": TARED}
     parameters = (
         Parameter("zero", "1", -0.10, 0.10, "declared, share of full scale", 3, 0.0),
         Parameter("tau_s", "s", 60.0, 1800.0, "warm-up of strain-gauge cells, 1 to 30 min", 4),
         Parameter("thermal", "1/K", -0.003, 0.003, "declared, ten times OIML R 60 class C", 3, 0.0),
     )
     on_by_default = False
-
-    def __post_init__(self) -> None:
-        """Refuse unknown words."""
-        choice("tared", self.tared, TARED)
 
     def applies(self, flow: Flow) -> str:
         """Only time or temperature can show it."""

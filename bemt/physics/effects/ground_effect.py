@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.physics.effects.base import Array, Effect, Flow, Parameter, choice
+from bemt.physics.effects.base import Array, Effect, Flow, Parameter
 
 FORMS = ("cheeseman_bennett", "hayden")
 
@@ -45,20 +45,14 @@ class GroundEffect(Effect):
         "more thrust at the same speed and torque; fades with airspeed, unlike a cell gain, unless the wall also "
         "blocks the wind"
     )
+    words = {"form": FORMS}
+    in_duct = "what a wall behind a duct does is not modelled"
     parameters = (
         Parameter("z_over_R", "1", 0.5, 3.0, "validity of Cheeseman and Bennett 1955"),
         Parameter("strength", "1", 0.0, 3.0, "1 is the published form; 3: below the ideal tube", steps=0, off=0.0),
         Parameter("plate_radius_over_R", "1", 0.0, 3.0, "radius of plates of stands", steps=0, off=0.0),
     )
     on_by_default = False
-
-    def __post_init__(self) -> None:
-        """Refuse unknown forms."""
-        choice("form", self.form, FORMS)
-
-    def applies(self, flow: Flow) -> str:
-        """Behind a duct a wall throttles the exit: torque rises, thrust goes either way."""
-        return "what a wall behind a duct does is not modelled" if flow.ducted else ""
 
     def flow(self, flow: Flow) -> None:
         """Take the dammed shares of induced speed and wind off the onset speed."""

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.physics.effects.base import Array, Effect, Flow, Parameter, RotorBuild, choice
+from bemt.physics.effects.base import Array, Effect, Flow, Parameter, RotorBuild
 
 
 @dataclass(frozen=True)
@@ -47,6 +47,8 @@ class LipSeparation(Effect):
         "thrust drops and torque rises above one loading and they recover below a lower one; Mach effects have no "
         "hysteresis"
     )
+    words = {"by": ("load", "advance", "turning")}
+    needs_duct = True
     parameters = (
         Parameter("onset", "1", 0.005, 0.95, "declared; share of the largest value of what `by` asks", 4),
         Parameter("loss", "1", 0.0, 1.0, "over 1/2 rho (w - V)^2, Idelchik 1986, diagram 3-1", 3, 0.0),
@@ -54,14 +56,6 @@ class LipSeparation(Effect):
         Parameter("width", "1", 0.0, 4.0, "declared; a lip stalls at once or bit by bit", 2),
     )
     on_by_default = False
-
-    def __post_init__(self) -> None:
-        """Refuse unknown measures."""
-        choice("by", self.by, ("load", "advance", "turning"))
-
-    def applies(self, flow: Flow) -> str:
-        """An open rotor has no lip."""
-        return "" if flow.ducted else "the rotor has no duct"
 
     def momentum(self, bake: RotorBuild) -> None:
         """Lose the head."""

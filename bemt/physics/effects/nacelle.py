@@ -34,6 +34,7 @@ class Nacelle(Effect):
     title = "body behind the propeller"
     check = "run without the propeller at the same airspeeds and subtract that drag"
     sign = "thrust is low by an amount that grows with V^2 (in the slipstream also with load), torque barely changes"
+    flies = True
     parameters = (
         Parameter("deficit", "1", 0.0, 0.6, "0.25 on the axis of a half-body, more of a blunt one", 4, 0.0),
         Parameter("cd", "1", 0.0, 1.2, "spinner to bluff motor, on hub area, Hoerner 1965", 4, 0.0),
@@ -42,10 +43,6 @@ class Nacelle(Effect):
     )
     discrete = ("wash",)
     on_by_default = False
-
-    def applies(self, flow: Flow) -> str:
-        """A body at rest in still air does nothing."""
-        return "" if np.any(flow.V > 0.0) else "no point has airspeed"
 
     def inflow(self, bake: RotorBuild) -> None:
         """Slow the axial flow, most at the root."""

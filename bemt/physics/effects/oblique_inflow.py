@@ -32,16 +32,12 @@ class ObliqueInflow(Effect):
         "thrust and torque rise with airspeed as if J were lower, with a force in the plane of the disk; no change "
         "in static runs; a pitot that reads high by 1 / cos(angle) looks the same"
     )
+    in_duct = "oblique flow is solved for open rotors only"
+    flies = True
     parameters = (
         Parameter("angle_deg", "deg", 0.0, 90.0, "full turn of the stand; seldom unnoticed (declared)", 7, 0.0, 20.0),
     )
     on_by_default = False
-
-    def applies(self, flow: Flow) -> str:
-        """At rest there is no direction, and a ducted rotor is not solved in oblique flow."""
-        if flow.ducted:
-            return "oblique flow is solved for open rotors only"
-        return "" if np.any(flow.V > 0.0) else "no point has airspeed"
 
     def flow(self, flow: Flow) -> None:
         """Part the airspeed into its share along the shaft and in the plane of the disk."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.physics.effects.base import Array, Effect, Parameter, RotorBuild, choice
+from bemt.physics.effects.base import Array, Effect, Parameter, RotorBuild
 from bemt.physics.sections.polars import first_stall
 
 FORMS = ("viterna", "plate")
@@ -39,13 +39,11 @@ class PostStall(Effect):
         "only where the blade stalls (low advance ratio, high pitch): more torque, thrust on a plateau; no change "
         "unstalled"
     )
+    words = {"form": FORMS}
     parameters = (Parameter("cd_max", "1", 1.1, 2.0, "1.11 + 0.018 AR to flat plate, Viterna 1982"),)
+    tried = {"form": FORMS, "cd_max": (1.1, 1.25, 1.4, 1.55, 1.7, 1.85, 2.0)}
     order = 12
     on_by_default = False
-
-    def __post_init__(self) -> None:
-        """Refuse unknown forms."""
-        choice("form", self.form, FORMS)
 
     def section(self, bake: RotorBuild) -> None:
         """Change the tables beyond the stall, on both sides."""
@@ -74,10 +72,6 @@ class PostStall(Effect):
         w = t * t * (3.0 - 2.0 * t)
         bake.cl += w * (sign * self.cd_max * np.sin(a) * np.cos(a) - bake.cl)
         bake.cd += w * (self.cd_max * np.sin(a) ** 2 - bake.cd)
-
-    def variants(self) -> tuple[dict[str, str | float], ...]:
-        """Both forms at seven drag levels."""
-        return tuple({"form": f, "cd_max": c} for f in FORMS for c in (1.1, 1.25, 1.4, 1.55, 1.7, 1.85, 2.0))
 
 
 def _stall(bake: RotorBuild, sign: float) -> Array:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from bemt.physics.effects.base import Effect, Parameter, RotorBuild, choice
+from bemt.physics.effects.base import Effect, Parameter, RotorBuild
 from bemt.physics.sections.polars import RE_FIXED
 
 
@@ -33,16 +33,13 @@ class Reynolds(Effect):
     id = "reynolds"
     title = "Reynolds number effect on the sections"
     sign = "torque coefficient falls and thrust coefficient rises with speed; both collapse on the Reynolds number"
+    words = {"form": ("table", "power")}
     parameters = (
         Parameter("amount", "1", 0.0, 3.0, "1: the tables; declared range", 4),
         Parameter("exponent", "1", 0.0, 0.6, "0.2 turbulent, 0.5 laminar flat plate", steps=0),
         Parameter("lift_exponent", "1", 0.0, 0.2, "declared; low-Re lift of cambered sections", steps=0),
     )
     order = 5
-
-    def __post_init__(self) -> None:
-        """Refuse unknown forms."""
-        choice("form", self.form, ("table", "power"))
 
     def section(self, bake: RotorBuild) -> None:
         """Stretch the tables, or replace them by the power laws."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.physics.effects.base import Array, Effect, Parameter, RotorBuild, choice
+from bemt.physics.effects.base import Array, Effect, Parameter, RotorBuild
 
 FORMS = ("chaviaropoulos", "snel", "du_selig")
 # Du and Selig's weight turns back at wider roots than wind turbines have, and below zero at chord = r.
@@ -41,15 +41,13 @@ class StallDelay(Effect):
         "more thrust than the tables give where the root stalls: low advance ratio and high pitch, inboard; no "
         "change unstalled"
     )
+    words = {"form": FORMS}
     parameters = (
         Parameter("coefficient", "1", 1.0, 4.0, "3 is the published strength of each form", 5, 0.0),
         Parameter("normal", "1", 0.0, 1.0, "1: the gain is a force normal to the chord; 0: lift only", 0),
     )
+    tried = {"form": FORMS, "coefficient": (1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0)}
     order = 20
-
-    def __post_init__(self) -> None:
-        """Refuse unknown forms."""
-        choice("form", self.form, FORMS)
 
     def section(self, bake: RotorBuild) -> None:
         """Lift the stalled part of the tables."""
@@ -75,7 +73,3 @@ class StallDelay(Effect):
         power = wide ** (1.0 / r_over_R)
         lead = 1.6 * wide / 0.1267 * (1.0 - power) / (1.0 + power) - 1.0
         return np.asarray(self.coefficient / 3.0 * lead / (2.0 * np.pi))
-
-    def variants(self) -> tuple[dict[str, str | float], ...]:
-        """All forms at seven strengths."""
-        return tuple({"form": f, "coefficient": c} for f in FORMS for c in (1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0))

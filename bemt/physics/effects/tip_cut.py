@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.physics.effects.base import Effect, Flow, Parameter, RotorBuild
+from bemt.physics.effects.base import Effect, Parameter, RotorBuild
 
 
 @dataclass(frozen=True)
@@ -29,12 +29,9 @@ class TipCut(Effect):
     title = "blades shorter than stated"
     sign = "less thrust and even less torque at every speed; the advance ratio of zero thrust barely moves"
     check = "measure the diameter"
+    in_duct = "in a duct shorter blades are a wider tip gap"
     parameters = (Parameter("cut", "1", 0.0, 0.15, "declared, share of the radius", 4, 0.0),)
     on_by_default = False
-
-    def applies(self, flow: Flow) -> str:
-        """In a duct the gap is what changes."""
-        return "in a duct shorter blades are a wider tip gap" if flow.ducted else ""
 
     def blade(self, bake: RotorBuild) -> None:
         """End the blades at the new radius."""

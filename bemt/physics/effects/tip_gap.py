@@ -37,6 +37,7 @@ class TipGap(Effect):
     along = ("tip_gap_m",)
     torque_open = True
     sign = "thrust and pressure rise drop in proportion to gap over span; no change on an open rotor"
+    needs_duct = True
     parameters = (
         Parameter("loss", "1", *GAP_LOSS, "Wisler 1985; Cumpsty 1989, not checked", 3),
         Parameter("scale", "1", 0.02, 0.10, "declared", 0),
@@ -56,7 +57,3 @@ class TipGap(Effect):
         if gap is None or not np.nanmax(gap) > 0.0:
             return None
         return np.asarray(np.nan_to_num(gap / np.nanmax(gap), nan=1.0))
-
-    def applies(self, flow: Flow) -> str:
-        """An open rotor has no wall to leak along."""
-        return "" if flow.ducted else "the rotor has no duct"

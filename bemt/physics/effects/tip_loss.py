@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bemt.physics.effects.base import Effect, Parameter, RotorBuild, choice
+from bemt.physics.effects.base import Effect, Parameter, RotorBuild
 
 
 @dataclass(frozen=True)
@@ -33,11 +33,8 @@ class TipLoss(Effect):
         "less thrust, and less torque by a smaller share; grows with loading; depends on J and blade count, not on "
         "speed"
     )
+    words = {"sheets": ("wake", "disk")}
     parameters = (Parameter("strength", "1", 0.5, 1.3, "shared effect table of the project; 1 is Prandtl"),)
-
-    def __post_init__(self) -> None:
-        """Refuse unknown sheets."""
-        choice("sheets", self.sheets, ("wake", "disk"))
 
     def momentum(self, bake: RotorBuild) -> None:
         """Switch the tip factor on."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from bemt.base import unit_errors
-from bemt.physics.effects.base import Effect, Flow, Parameter, Reading, choice
+from bemt.physics.effects.base import Effect, Flow, Parameter, Reading
 
 _SIGNED = ("thrust_N", "torque_Nm", "airspeed_m_s")
 _KINDS = {"thrust_N": "force", "torque_Nm": "torque", "rpm": "rotation", "airspeed_m_s": "airspeed",
@@ -53,12 +53,9 @@ class UnitSlip(Effect):
     kind = "stand"
     fault = "unit"
     discrete = ("factor",)
+    words = {"channel": CHANNELS}
     parameters = (Parameter("factor", "1", -1e5, 1e5, "ratios of units by definition; -1: the other sign", 0, 1.0),)
     on_by_default = False
-
-    def __post_init__(self) -> None:
-        """Refuse unknown channels."""
-        choice("channel", self.channel, CHANNELS)
 
     def flow(self, flow: Flow) -> None:
         """Undo the slip in what the rotor met."""

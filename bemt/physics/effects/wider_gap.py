@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bemt.physics.effects.base import Effect, Flow, Parameter, RotorBuild
+from bemt.physics.effects.base import Effect, Parameter, RotorBuild
 
 
 @dataclass(frozen=True)
@@ -26,6 +26,7 @@ class WiderGap(Effect):
     title = "wrong tip gap"
     sign = "thrust of a ducted rotor drops at every speed, torque by less; no change on an open rotor"
     check = "measure the gap with a feeler gauge"
+    needs_duct = True
     parameters = (Parameter("extra_mm", "mm", -1.0, 4.0, "declared; printed and moulded ducts", 6, 0.0, 0.5),)
     on_by_default = False
 
@@ -33,7 +34,3 @@ class WiderGap(Effect):
         """Lengthen the gap."""
         if bake.ducted:
             bake.gap = max(bake.gap + 1e-3 * self.extra_mm, 0.0)
-
-    def applies(self, flow: Flow) -> str:
-        """An open rotor has no gap."""
-        return "" if flow.ducted else "the rotor has no duct"

@@ -198,7 +198,7 @@ class Job:
 class Export(ABC):
     """A target: a simulator, a disk of a flow solver, a design tool, a solid.
 
-    A subclass in a module of ``bemt/tools/exports/`` is found by scanning, one of another tool by its ``offers``; its
+    A subclass in a module of ``bemt/tools/exports/`` is found by scanning, one of another tool by its ``EXPORTS``; its
     ``id`` is the value of ``--format``.
 
     A class defines ``id`` (name on the command line) and ``title``; ``kind``: ``solid``, ``loads`` (thrust and

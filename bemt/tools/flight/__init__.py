@@ -5,3 +5,6 @@
 ``speed_sensor``, ``wind`` -> ``judge`` (a flight beside healthy ones: the judge of the diagnosis on the ``balance`` of
 the body, and the next flight) -> ``answer`` (document) -> ``text``, ``picture``.
 """
+
+ACTIONS = {"fly": "bemt.tools.flight.actions:fly"}
+FILE_KINDS = {"bemt fly": "bemt.tools.flight.read:kind_of"}

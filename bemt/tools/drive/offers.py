@@ -1,7 +1,0 @@
-"""What the drive offers to the house (:mod:`bemt.base.plugins`)."""
-
-CASE_PARTS = {
-    "drive": "bemt.tools.drive.drive_result:full_document",
-    "circuit": "bemt.tools.drive.drive_result:circuit",
-}
-ACTIONS = {name: f"bemt.tools.drive.actions:{name}" for name in ("drive", "map", "motor", "thrusters")}
