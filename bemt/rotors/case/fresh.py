@@ -153,7 +153,7 @@ sag = {sag:g}  # or resistance_mohm, of the pack with leads
 # capacity_Ah = 2.2  # for the flight time
 
 [drive.motor]
-size = {size:g}  # a winding usual for K_v and cells. Better: replace this line by resistance_mohm, mass_g or stator
+size = {size:g}  # a winding usual for its current. Better: replace this line by resistance_mohm, mass_g or stator
 idle_share = {idle:g}  # of the current. Better: replace this line by no_load_A, from the motor's sheet
 
 # [drive.vehicle]  # for hover
