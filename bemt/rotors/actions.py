@@ -37,7 +37,8 @@ def estimate(
     Parameters
     ----------
     label : str
-        As on the propeller: ``10x4.7``, ``APC 10x4.7SF``, ``8x5x3``, ``5045``.
+        As on the propeller: ``10x4.7``, ``APC 10x4.7SF``, ``8x5x3``, ``5045``. Endings (E, MR, SF) tell the kind of
+        blade and change the answer.
     rpm : array_like
         Speeds of rotation. [rev/min]
     airspeed_m_s : array_like
