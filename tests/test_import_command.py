@@ -332,3 +332,15 @@ def test_watts_beside_volts_are_what_the_supply_gave(tmp_path: Path, heading: st
     assert points["electrical_power_W"].tolist() == [12, 26, 48, 80] and "power_W" not in points
     file.write_text(f"rpm,torque_Nm,volts,{heading}\n" + "".join(f"{','.join(map(str, r))}\n" for r in rows))
     assert "electrical_power_W" not in named(import_file(file))
+
+
+@pytest.mark.parametrize("told", ["lift=g", "LIFT=gf", "Grams=g", "grams=g", "Thrust=g"])
+def test_a_unit_is_taken_by_a_heading_or_a_quantity_in_any_case(tmp_path: Path, told: str) -> None:
+    file, head = tmp_path / "bench.csv", "Grams" if told.casefold().startswith("grams") else "lift"
+    file.write_text(f"rpm,{head},torque_Nm\n3000,110,0.01\n4000,196,0.02\n5000,306,0.03\n")
+    stated = ["--column", f"thrust={head}"] if told.startswith("Thrust") else []
+    assert main(["import", str(file), "--unit", told, *stated, "--out", str(tmp_path / "kept.toml")]) == 0
+    assert named(import_file(tmp_path / "kept.toml"))["thrust_N"] == pytest.approx(
+        np.array([110, 196, 306]) * 9.80665e-3
+    )
+    assert main(["import", str(file), "--unit", told.replace("=g", "=parsec")]) == 2

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
-from bemt.base.action import Count, Told, action
+from bemt.base.action import Cells, Count, Told, action
 
 if TYPE_CHECKING:
     import os
@@ -97,7 +97,7 @@ def new(
     scan: str | os.PathLike[str] | None = None, unit: Literal["mm", "m", "in"] | None = None,
     diameter_mm: float | None = None, diameter_in: float | None = None, fan: bool = False,
     blades: Count | None = None, rpm: float | None = None, airspeed_m_s: float = 0.0, series: str | None = None,
-    kv: float | None = None, cells: Count | None = None,
+    kv: float | None = None, cells: Cells | None = None,
     reading: str | Mapping[str, float] | None = None, campaign: bool = False,
     out: str | os.PathLike[str] | None = None,
 ) -> Told:  # fmt: skip
