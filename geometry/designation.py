@@ -12,7 +12,7 @@ BLADE_CLASSES = ("electric", "slow_flyer", "multirotor", "folding", "sport", "fp
 """Kinds of blades that a label tells apart; sport is for glow engines, reversible turns both ways, pattern is F3A."""
 
 # Letters behind the size, in any combination (APC: 20.5x13.5EPN, 9x4.5MRF-RH, 8x3.7SFR), the longer first.
-_CLASS_LETTERS = {"sf": "slow_flyer", "mr": "multirotor", "pn": "pattern", "bn": "fpv", "e": "electric", "f": "folding"}
+ENDINGS = {"sf": "slow_flyer", "mr": "multirotor", "pn": "pattern", "bn": "fpv", "e": "electric", "f": "folding"}
 _LETTERS = re.compile(r"(?:sf|mr|pn|bn|cf|[efwncpsr])+(?:-[rl]h)?|[rl]h|ccw|cw", re.IGNORECASE)
 _PART = re.compile(r"sf|mr|pn|bn|cf|ccw|cw|[rl]h|[efwncpsr]", re.IGNORECASE)
 _VERSION = re.compile(r"(?<![A-Za-z])V\d\w*$|(?<=[A-Za-z])V\d\w*$", re.IGNORECASE)  # of a mould
@@ -151,7 +151,7 @@ class _Suffix:
     def of(letters: str) -> _Suffix:
         """Read letters such as ``WSF`` or ``MRF-RH``; an R behind others, or with a hand, is a reversible blade."""
         parts = [part.lower() for part in _PART.findall(letters)]
-        kinds = [_CLASS_LETTERS[part] for part in parts if part in _CLASS_LETTERS]
+        kinds = [ENDINGS[part] for part in parts if part in ENDINGS]
         both_ways = "r" in parts and (parts.index("r") > 0 or bool({"rh", "lh"} & set(parts)))
         kind = "reversible" if both_ways else "pattern" if "pattern" in kinds else kinds[0] if kinds else None
         reverse = bool({"p", "lh", "ccw"} & set(parts)) or ("r" in parts and not both_ways)

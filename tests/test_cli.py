@@ -11,6 +11,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -490,3 +491,30 @@ def test_a_word_that_is_no_command_of_the_laboratory_is_answered_with_those_that
     assert cli.main(["lab", "nothing"]) == 2
     told = capsys.readouterr().err
     assert "cite" in told and "estimate" not in told
+
+
+def test_cells_are_taken_as_people_write_them(capsys: pytest.CaptureFixture[str]) -> None:
+    for words in (["drive", "10x5"], ["choose", "--thrust-N", "5", "--labels", "10x5"]):
+        told = []
+        for cells in ("3", "3S", "3s"):
+            assert cli.main([*words, "--kv", "1000", "--cells", cells, "--json"]) == 0
+            told.append(capsys.readouterr().out)
+        assert told[0] == told[1] == told[2]
+    assert package.drive("10x5", kv=1000, cells="3S").text == package.drive("10x5", kv=1000, cells=3).text  # type: ignore
+    for cells in ("3x", "S", "3.5", "0"):
+        assert ended(["drive", "10x5", "--kv", "1000", "--cells", cells]) == 2
+
+
+def test_long_work_shows_that_it_goes_on_where_stderr_is_a_pipe_too(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(registry, "SILENT_S", 0.05)
+    with registry.progress() as say:
+        say("solving")
+        time.sleep(0.5)
+    seen = capsys.readouterr()
+    assert not seen.out and 1 <= seen.err.count("solving") <= 4
+    with registry.progress(quiet=True) as say:
+        say("solving")
+        time.sleep(0.2)
+    assert not capsys.readouterr().err

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -113,3 +115,26 @@ def test_numbers_that_are_none_come_all_at_once(capsys: pytest.CaptureFixture[st
     said = capsys.readouterr().err.splitlines()
     assert any(line.startswith("label") for line in said) and any("--density-kg-m3: got 19" in line for line in said)
     assert len(said) == 6
+
+
+def test_a_label_without_an_ending_says_once_that_its_kind_of_blade_is_open(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for label, known in (("10x5", ["APC Thin Electric", "Master Airscrew Scimitar"]), ("APC 10x5", ["APC Thin"])):
+        for words in (["estimate", label, "--rpm", "6000", "7000"], ["new", label, "--out", str(tmp_path / label)]):
+            assert cli.main(words) == 0
+            (line,) = [x for x in capsys.readouterr().out.splitlines() if "no ending" in x]
+            assert all(word in line for word in ("MR", "SF", *known))
+    for label in ("10x5E", "APC 10x4.7SF", "5x4.3x3"):
+        assert cli.main(["estimate", label, "--rpm", "6000"]) == 0
+        assert "no ending" not in capsys.readouterr().out
+
+
+def test_at_rest_the_figure_of_merit_stands_where_an_efficiency_would_be_zero() -> None:
+    found = bemt.estimate("10x5", 6000, [0.0, 10.0])
+    rest, flying = found.to_dict()["rows"]
+    ideal = rest["thrust_N"] ** 1.5 / (0.5 * math.pi * 1.225 * (10 * INCH) ** 2) ** 0.5
+    assert rest["FM"] == pytest.approx(ideal / rest["power_W"]) and flying["FM"] is None
+    assert "FM" in found.text and "FM" not in bemt.estimate("10x5", 6000, 10.0).text
+    swept = bemt.sweep([Path("cases/prop_10x5").as_posix()]).details
+    assert f"{rest['FM']:.1f}" in swept[swept.index("FM") :]

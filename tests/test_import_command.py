@@ -16,6 +16,7 @@ import bemt
 from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.data.recordings.adapt import Choice
+from bemt.data.recordings.channels import named
 from bemt.data.recordings.load import import_file, import_files
 
 PERIOD = 0.5
@@ -319,3 +320,27 @@ def test_the_air_alone_makes_a_recording(tmp_path: Path) -> None:
     assert read["CT"][0] == pytest.approx(2.50 / (1.19 * 50.1**2 * 0.3048**4), rel=1e-3)
     with pytest.raises(bemt.InputError, match="density_kg_m3"):
         bemt.read(tmp_path / "good.csv").plot("rpm", ["CT", "CP"])
+
+
+@pytest.mark.parametrize("heading", ["watts", "power (W)"])
+def test_watts_beside_volts_are_what_the_supply_gave(tmp_path: Path, heading: str) -> None:
+    """A shaft has its power by a torque; with one, a bare power stays open."""
+    rows = [(3000, 1.1, 11.1, 12), (4000, 1.9, 11.0, 26), (5000, 3.0, 10.9, 48), (6000, 4.3, 10.8, 80)]
+    file = tmp_path / "bench.csv"
+    file.write_text(f"rpm,thrust_N,volts,{heading}\n" + "".join(f"{','.join(map(str, r))}\n" for r in rows))
+    points = named(import_file(file))
+    assert points["electrical_power_W"].tolist() == [12, 26, 48, 80] and "power_W" not in points
+    file.write_text(f"rpm,torque_Nm,volts,{heading}\n" + "".join(f"{','.join(map(str, r))}\n" for r in rows))
+    assert "electrical_power_W" not in named(import_file(file))
+
+
+@pytest.mark.parametrize("told", ["lift=g", "LIFT=gf", "Grams=g", "grams=g", "Thrust=g"])
+def test_a_unit_is_taken_by_a_heading_or_a_quantity_in_any_case(tmp_path: Path, told: str) -> None:
+    file, head = tmp_path / "bench.csv", "Grams" if told.casefold().startswith("grams") else "lift"
+    file.write_text(f"rpm,{head},torque_Nm\n3000,110,0.01\n4000,196,0.02\n5000,306,0.03\n")
+    stated = ["--column", f"thrust={head}"] if told.startswith("Thrust") else []
+    assert main(["import", str(file), "--unit", told, *stated, "--out", str(tmp_path / "kept.toml")]) == 0
+    assert named(import_file(tmp_path / "kept.toml"))["thrust_N"] == pytest.approx(
+        np.array([110, 196, 306]) * 9.80665e-3
+    )
+    assert main(["import", str(file), "--unit", told.replace("=g", "=parsec")]) == 2

@@ -19,7 +19,8 @@ from bemt.results.report.diagnosis_block import answer, verdict
 from bemt.results.sweep.answer import summary
 from bemt.results.sweep.case import solve_case
 from bemt.rotors.case import Case, case_of, estimate, fresh, lattice, load_case
-from bemt.rotors.case.motor import class_resistance, full_speed, named_motor
+from bemt.rotors.case.load import with_changes
+from bemt.rotors.case.motor import class_resistance, full_speed, known_mass_g, named_motor
 from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.case.propagate import propagate
 from bemt.rotors.case.reading import parse_reading, with_reading
@@ -208,7 +209,8 @@ def test_three_blades_of_racers_are_those_of_a_stand(shared_data: Path) -> None:
 
 def test_one_motor_turns_a_smaller_propeller_faster() -> None:
     small, large = (
-        drive_result.solve(drive_result.with_drive(rotor_of(label).case, kv=920, cells=3)) for label in ("9x4", "12x6")
+        drive_result.solve(drive_result.with_drive(rotor_of(label).case, kv=920, cells=3, motor_mass_g=80))
+        for label in ("9x4", "12x6")
     )
     assert small.drive.motor.resistance_ohm == pytest.approx(large.drive.motor.resistance_ohm)
     for one in (small, large):  # by hand: k (I - I0) is the torque at the speed that U - R I leaves
@@ -226,7 +228,22 @@ def test_one_motor_turns_a_smaller_propeller_faster() -> None:
 def test_the_class_of_a_motor_is_its_mass_if_known() -> None:
     table = drive_result.with_drive(rotor_of("9x4").case, kv=920, cells=3).file.drive
     heavy = drive_result.with_drive(rotor_of("9x4").case, kv=920, cells=3, motor_mass_g=120).file.drive
-    assert table is not None and heavy is not None and class_resistance(heavy) < class_resistance(table)
+    assert table is not None and heavy is not None
+    assert class_resistance(10.0, 920.0, known_mass_g(heavy.motor)) < class_resistance(10.0)
+    assert np.isnan(known_mass_g(table.motor))
+
+
+@pytest.mark.parametrize("V", [0.0, 15.0])
+def test_a_motor_of_which_only_kv_is_known_is_one_to_choose_and_to_drive(V: float) -> None:
+    """Full throttle is one number, and the motor the same one at rest and in flight."""
+    still, flying = (bemt.drive("10x6", kv=1100, cells=3, airspeed_m_s=v) for v in (0.0, V))
+    assert flying.drive.motor == still.drive.motor and flying.drive.battery == still.drive.battery
+    row = bemt.choose(4.0, 3, labels=["10x6"], kv=1100, airspeed_m_s=V).to_pandas().iloc[0]
+    assert row.full_thrust_N == pytest.approx(flying.full["thrust_N"].value, rel=0.01)
+    assert row.peak_A == pytest.approx(flying.full["battery_A"].value, rel=0.01)
+    case = drive_result.with_drive(rotor_of("10x6").case, kv=1100, cells=3)
+    there = with_changes(case, {"operating.airspeed_m_s": V})
+    assert full_speed(there) == pytest.approx(flying.full["rpm"].value, rel=3e-3)
 
 
 def test_a_motor_by_name() -> None:

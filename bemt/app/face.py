@@ -17,7 +17,7 @@ from typing import Any
 
 from bemt.app import registry
 from bemt.app.registry import complain, progress
-from bemt.base.action import Declaration, about, check_counts, choices_of, did_you_mean
+from bemt.base.action import Declaration, about, cells_of, check_counts, choices_of, did_you_mean
 from bemt.base.errors import EXIT_OK
 
 PROGRESS = "progress"
@@ -29,7 +29,7 @@ class Option:
     """One parameter of an action, as both doors know it."""
 
     name: str
-    kind: str  # flag, choice, mapping, pair, number, count or text
+    kind: str  # flag, choice, mapping, pair, number, count, cells or text
     many: bool
     default: Any  # inspect.Parameter.empty where it is required
     choices: tuple[str, ...]
@@ -52,6 +52,8 @@ class Option:
             return float(text)
         if self.kind == "count":
             return [int(part) for part in text.split(",")] if self.many else int(text)
+        if self.kind == "cells":
+            return int(cells_of(text))
         if self.kind == "choice":
             return {c.lower(): c for c in self.choices}.get(text.lower(), text)
         return text
@@ -91,7 +93,7 @@ def parameters(function: Callable[..., Any]) -> tuple[Option, ...]:
             "flag" if kind == "bool" else "choice" if words else "mapping" if "Mapping[str, str]" in kind
             else "pair" if "tuple[float, float]" in kind else "text" if re.search(r"\bstr\b(?!, Array)", kind)
             else "number" if re.search(r"float|(?<!str, )ArrayLike", kind)
-            else "count" if re.search(r"\bint\b|Count", kind) else "text"
+            else "cells" if "Cells" in kind else "count" if re.search(r"\bint\b|Count", kind) else "text"
         )  # fmt: skip
         many = re.search(r"Sequence|(?<!str, )ArrayLike", kind) is not None
         found.append(Option(name, what, many, given.default, words, told.get(name, "")))
@@ -142,9 +144,12 @@ class Parser(argparse.ArgumentParser):
             typed = [word.partition("=")[0] for word in self._words if word.startswith("--")]
             message += "".join(f". Got {w}.{did_you_mean(w, options)}" for w in typed if w not in options)
             message += f". As in: {self.like}" if self.like else ""
-        number = re.match(r"argument (.+?): invalid (number|count) value: '(.*)'$", message)
+        number = re.match(r"argument (.+?): invalid (number|count|cells) value: '(.*)'$", message)
         if number:
-            expected = "a number, without its unit" if number[2] == "number" else "a whole number, without its unit"
+            of_cells = "a whole number, as 3 or 3S"
+            expected = (
+                of_cells if number[2] == "cells" else f"a {'whole ' * (number[2] == 'count')}number, without its unit"
+            )
             listed = re.search("[,:]", number[3]) is not None
             hint = " Several are separated by spaces, the decimal mark is a point." if listed else ""
             message = f"{number[1]}: got {number[3] or 'nothing'}; expected {expected}.{hint}"
@@ -275,7 +280,9 @@ def run(function: Callable[..., Any], argv: Sequence[str], prog: str = "bemt") -
     check_folders(told.command, given)
     check_files({p.name for p in parameters(function) if p.kind == "text"}, given)
     inner = inspect.unwrap(function)  # the faults of the command line name options
-    check_counts([p.name for p in parameters(function) if "Count" in str(inner.__annotations__[p.name])], given)
+    check_counts(
+        [p.name for p in parameters(function) if re.search("Count|Cells", str(inner.__annotations__[p.name]))], given
+    )
     with progress(args.quiet or args.json) as say, nothing_empty(given.get("out")):
         if PROGRESS in inspect.signature(function).parameters:
             given[PROGRESS] = say

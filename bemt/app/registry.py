@@ -7,6 +7,7 @@ import re
 import shutil
 import sys
 import textwrap
+import threading
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -28,26 +29,43 @@ SAID = (
 REFUSED = ((YELLOW, r"^\S*[Ww]arning: "), (RED, r"^.*?: (?=got )|^.*?: error: |^internal error.*|^interrupted$"))
 """The same for stderr."""
 
+SILENT_S = 5.0
+"""Time after which work is long: declared [s]."""
+
 
 @contextmanager
 def progress(quiet: bool = False) -> Iterator[Callable[[str], None]]:
-    """Give a function that shows a line; does nothing if quiet, or if stderr is not a terminal.
+    """Give a function that shows a line; does nothing if quiet.
 
-    A line that ends with a line feed stays, on every stream.
+    A line that ends with a line feed stays, on every stream. Where stderr is no terminal, which takes lines back, the
+    others show only that long work goes on: after `SILENT_S`, then ever more rarely.
     """
     shown = sys.stderr.isatty() and not quiet
     width = shutil.get_terminal_size().columns - 1  # a wrapped line could not be taken back
+    last, done = "working", threading.Event()
 
     def say(line: str) -> None:
+        nonlocal last
         if line.endswith("\n"):
             complain(("\r\x1b[2K" if shown else "") + line.rstrip("\n"))
-        elif shown:
+            return
+        last = line
+        if shown:
             sys.stderr.write(f"\r\x1b[2K{line[:width]}")
             sys.stderr.flush()
 
+    def live() -> None:
+        pause = SILENT_S
+        while not done.wait(pause):
+            complain(f"{last} ...")
+            pause *= 2.0
+
+    if not shown and not quiet:
+        threading.Thread(target=live, daemon=True).start()
     try:
         yield say
     finally:
+        done.set()
         if shown:
             sys.stderr.write("\r\x1b[2K")
             sys.stderr.flush()

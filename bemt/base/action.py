@@ -21,13 +21,14 @@ from typing import Any, ParamSpec, TypeVar
 from bemt.base.errors import EXIT_OK, Fault, InputError, refuse
 
 __all__ = [
-    "Answered", "Declaration", "Count", "Told", "about", "action", "choices_of", "did_you_mean", "in_words",
+    "Answered", "Declaration", "Cells", "Count", "Told", "about", "action", "choices_of", "did_you_mean", "in_words",
     "in_words_of_the_library", "options_of", "worded",
 ]  # fmt: skip
 
 P = ParamSpec("P")
 T = TypeVar("T")
 Count = int
+Cells = int
 """Whole number of 1 or more, in a signature."""
 
 
@@ -123,7 +124,8 @@ def worded(function: Callable[P, T]) -> Callable[P, T]:
     code = function.__code__
     names = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
     kinds = {name: str(kind) for name, kind in function.__annotations__.items() if name in names}
-    counts = tuple(name for name, kind in kinds.items() if "Count" in kind)
+    cells = tuple(name for name, kind in kinds.items() if "Cells" in kind)
+    counts = (*cells, *(name for name, kind in kinds.items() if "Count" in kind))
     choices = {name: found for name, kind in kinds.items() if (found := choices_of(kind))}
 
     @functools.wraps(function)
@@ -132,12 +134,25 @@ def worded(function: Callable[P, T]) -> Callable[P, T]:
             near = did_you_mean(unknown[0], names) or f" It takes {', '.join(n for n in names if n != 'self')}."
             raise TypeError(f"{function.__name__}() got {unknown[0]!r}.{near}")
         given = dict(zip(names, args, strict=False)) | more
+        given |= {name: cells_of(given[name]) for name in cells if name in given}
+        first: Any = (*(given[name] for name in names[: len(args)]), *args[len(names) :])
+        named: Any = {name: given[name] for name in more}
         check_counts(counts, given)
         check_choices(choices, given)
         with in_words_of_the_library():
-            return function(*args, **more)
+            return function(*first, **named)
 
     return call
+
+
+def cells_of(value: Any) -> Any:
+    """Cells in series of a battery as people write them; what is none stays, to be refused.
+
+    >>> [cells_of(value) for value in ("3S", "4", 6, "3x")]
+    [3, 4, 6, '3x']
+    """
+    found = re.fullmatch(r"\s*(\d+)\s*[sS]?\s*", value) if isinstance(value, str) else None
+    return int(found[1]) if found else value
 
 
 def check_counts(names: Iterable[str], given: dict[str, Any]) -> None:

@@ -170,16 +170,16 @@ def eta_limit(J: ArrayLike, CT: ArrayLike) -> Any:
     return _out(np.where(CT > 0.0, 2.0 * J / (J + np.sqrt(J**2 + 8.0 * CT / math.pi) + (CT == 0.0)), 1.0))
 
 
-def FM(CT: ArrayLike, CP: ArrayLike) -> Any:
-    """Figure of merit T^1.5/(P sqrt(2 rho A)) = sqrt(2/pi) CT^1.5/CP; NaN where CT < 0 or CP <= 0.
+def FM(CT: ArrayLike, CP: ArrayLike, J: ArrayLike = 0.0) -> Any:
+    """Figure of merit T^1.5/(P sqrt(2 rho A)) = sqrt(2/pi) CT^1.5/CP; NaN where CT < 0 or CP <= 0, and in flight.
 
     A ducted rotor may exceed 1: its own ideal power is lower.
 
     >>> round(FM(0.1, 0.04), 4)
     0.6308
     """
-    CT, CP = _f(CT), _f(CP)
-    return _ratio(math.sqrt(2.0 / math.pi) * np.maximum(CT, 0.0) ** 1.5, CP, (CP > 0) & (CT >= 0))
+    CT, CP, J = _f(CT), _f(CP), _f(J)
+    return _ratio(math.sqrt(2.0 / math.pi) * np.maximum(CT, 0.0) ** 1.5, CP, (CP > 0) & (CT >= 0) & (J == 0.0))
 
 
 def M_tip(n: ArrayLike, D: ArrayLike, a_sound: ArrayLike) -> Any:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
-from bemt.base.action import Count, Told, action
+from bemt.base.action import Cells, Count, Told, action
 
 if TYPE_CHECKING:
     import os
@@ -37,7 +37,8 @@ def estimate(
     Parameters
     ----------
     label : str
-        As on the propeller: ``10x4.7``, ``APC 10x4.7SF``, ``8x5x3``, ``5045``.
+        As on the propeller: ``10x4.7``, ``APC 10x4.7SF``, ``8x5x3``, ``5045``. Endings (E, MR, SF) tell the kind of
+        blade and change the answer.
     rpm : array_like
         Speeds of rotation. [rev/min]
     airspeed_m_s : array_like
@@ -96,7 +97,7 @@ def new(
     scan: str | os.PathLike[str] | None = None, unit: Literal["mm", "m", "in"] | None = None,
     diameter_mm: float | None = None, diameter_in: float | None = None, fan: bool = False,
     blades: Count | None = None, rpm: float | None = None, airspeed_m_s: float = 0.0, series: str | None = None,
-    kv: float | None = None, cells: Count | None = None,
+    kv: float | None = None, cells: Cells | None = None,
     reading: str | Mapping[str, float] | None = None, campaign: bool = False,
     out: str | os.PathLike[str] | None = None,
 ) -> Told:  # fmt: skip

@@ -77,6 +77,11 @@ class MeasuredRotor:
             self.diameter_in, self.pitch_in, self.blades, class_of(self.family), FAMILIES.get(self.family, self.family)
         )
 
+    def has_size(self, told: Designation) -> bool:
+        """Whether a label states its diameter, pitch and blades."""
+        apart = max(abs(self.diameter_in - told.diameter_in), abs(self.pitch_in - told.pitch_in))
+        return apart < _CLOSE_IN and self.blades == (told.blades or 2)
+
     def as_built(self) -> tuple[Prior, ReferenceRun]:
         """Law of the latent numbers and rows of the run, as `bemt.rotors.as_measured` gives them."""
         p = population()
@@ -116,8 +121,7 @@ def find(told: Designation, family: str | None = None) -> MeasuredRotor | None:
     """
     family = family or family_of(told.maker, told.blade_class, told.blades)
     for one in records().values():
-        sized = max(abs(one.diameter_in - told.diameter_in), abs(one.pitch_in - told.pitch_in)) < _CLOSE_IN
-        if sized and one.family == family and one.blades == (told.blades or 2) and told.width == 0:
+        if one.has_size(told) and one.family == family and told.width == 0:
             return one
     return None
 

@@ -56,6 +56,16 @@ def pairs(option: str, given: Iterable[str], faults: list[Fault]) -> dict[str, s
     return out
 
 
+def _in_case(name: str, known: Iterable[str]) -> str:
+    """Word as it is known, if only its case differs; else as typed.
+
+    >>> _in_case("Torque", ["torque", "rpm"]), _in_case("T", ["t", "T"]), _in_case("lift", ["rpm"])
+    ('torque', 'T', 'lift')
+    """
+    like = [word for word in dict.fromkeys(known) if word.casefold() == name.casefold()]
+    return like[0] if len(like) == 1 else name
+
+
 def _quantity(name: str, unit: str) -> str | None:
     """Quantity of a column by the dimension of its unit."""
     if name in QUANTITIES:
@@ -84,7 +94,7 @@ def _gather(
 
 def _of_unit(name: str, text: str) -> tuple[str, Facts] | Fault:
     """What ``--unit NAME=UNIT`` says of a run: NAME is a quantity, or a column whose unit tells it."""
-    quantity = _quantity(name, text)
+    quantity = _quantity(_in_case(name, QUANTITIES), text)
     if quantity is None or unit_of(text) is None:
         usual = ", ".join(dict.fromkeys(u for _, u in QUANTITIES.values()))
         return Fault("", "--unit", f"{name}={text}", f"a unit of a load or a speed, such as {usual}")
@@ -261,9 +271,8 @@ def write_run(run: RunToml, out: str) -> Path:
 
 
 # A recording.toml from what a user types: units, columns and signs that the headings of a table do not say.
-_OF_DIMENSION = {"force": "thrust", "torque": "torque", "angular_speed": "rpm", "voltage": "voltage",
-                 "current": "current", "speed": "airspeed", "density": "density", "pressure": "pressure"}  # fmt: skip
-"""Quantity that a unit alone stands for."""
+_BY_UNIT = ("thrust", "torque", "rpm", "voltage", "current", "airspeed", "density", "pressure")
+"""Quantities that their unit alone stands for."""
 
 
 def _unit(quantity: str, text: str) -> str | None:
@@ -282,6 +291,7 @@ class _Measured:
 
     def column(self, name: str, text: str) -> tuple[str, Facts] | Fault:
         """``--column QUANTITY=HEADING``."""
+        name, text = _in_case(name, CHANNELS), _in_case(text, self.known)
         if name not in CHANNELS:
             return Fault("", "--column", name, f"one of {', '.join(CHANNELS)}", "As in --column thrust=Fz")
         if text not in self.known:
@@ -291,6 +301,7 @@ class _Measured:
 
     def unit(self, name: str, text: str) -> tuple[str, Facts] | Fault:
         """``--unit NAME=UNIT``, of a quantity or a heading."""
+        name = _in_case(name, self.known if _in_case(name, self.known) in self.known else CHANNELS)
         if name not in CHANNELS and name not in self.known:
             meant = did_you_mean(name, [*CHANNELS, *self.known]).strip()
             return Fault("", "--unit", name, f"one of {some(map(repr, self.known), 12)}, or a quantity", meant)
@@ -309,7 +320,7 @@ class _Measured:
 
     def sign(self, name: str, text: str) -> tuple[str, Facts] | Fault:
         """``--sign QUANTITY=-1``, or of a heading that --column named."""
-        quantity = self.taken.get(name, name)
+        quantity = self.taken.get(_in_case(name, self.taken), _in_case(name, CHANNELS))
         if quantity not in CHANNELS or text not in ("1", "-1"):
             return Fault("", "--sign", f"{name}={text}", "a quantity and -1, as in --sign thrust=-1")
         return quantity, {"sign": int(text)}
@@ -335,9 +346,7 @@ class _Measured:
 
     def _by_unit(self, name: str, text: str) -> str | None:
         """Quantity that the words of a heading mean and the unit goes with, else the one that a unit stands for."""
-        stated = unit_for("", text)
-        fits = (q for q in meanings(name) if _unit(q, text))
-        return next(fits, _OF_DIMENSION.get(stated[0].dimension) if stated else None)
+        return next((q for q in (*meanings(name), *_BY_UNIT) if _unit(q, text)), None)
 
     def complete(self, quantity: str, facts: Facts) -> Iterator[Fault]:
         """Add the column and the unit that the headings tell; faults where they do not."""

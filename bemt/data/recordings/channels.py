@@ -41,6 +41,7 @@ _DRIVE_SPEEDS = {
 }
 """Speeds that are the rotor's where there is no other, and on what condition."""
 # Says neither whose power it is.
+_ELECTRIC = {"current_A", "electrical_power_W"}
 _BARE_POWER = re.compile(r"\s*power\s*[\[(]\s*w(atts?)?\s*[\])]\s*", re.IGNORECASE)
 
 
@@ -150,9 +151,9 @@ def named(d: Dataset) -> Dataset:
     _angular(d, values, names, notes)
     _speed(d, values, names, notes)
     _command(values, names, notes)
-    _power(values, names, notes, d.values.get("P_W"))
-    bare = d.headings.get("power_W", "")
-    if names.get("power_W") == "power_W" and _BARE_POWER.fullmatch(bare):
+    plain = names.get("power_W") == "power_W" and _BARE_POWER.fullmatch(d.headings.get("power_W", ""))
+    _power(values, names, notes, values.get("power_W") if plain else d.values.get("P_W"))
+    if plain and "power_W" in values:
         notes.append("power_W: taken as shaft power; if a wattmeter read it, name the column electrical_power_W")
     none = int(np.sum(~np.isfinite(values["run"]))) if "run" in values else 0
     if none:
@@ -232,8 +233,12 @@ def electrical_power(values: Mapping[str, Array]) -> Array | None:
 
 
 def _power(values: dict[str, Array], names: dict[str, str], notes: list[str], bare: Array | None) -> None:
-    """Electrical power from its factors, and what a bare P stands for."""
-    if bare is not None and "power_W" not in values:
+    """Electrical power from its factors, and what a bare P stands for: without a torque, it is not of the shaft."""
+    if bare is not None and "voltage_V" in values and not {"torque_Nm", *_ELECTRIC} & values.keys():
+        names["electrical_power_W"] = names.pop("power_W", "P_W")
+        values["electrical_power_W"] = values.pop("power_W", bare)
+        notes.append(f"{names['electrical_power_W']} is electrical_power_W: a voltage is beside it, and no torque")
+    elif bare is not None and "power_W" not in values:
         shaft = shaft_power(values)
         electric = electrical_power(values)
         for name, product in (("power_W", shaft), ("electrical_power_W", electric)):

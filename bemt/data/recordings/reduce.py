@@ -343,9 +343,8 @@ def _numbers(series: Dataset, air: AirOfPoints, D: float) -> Dataset:
     if rpm is not None and np.any(np.isfinite(air.a_sound)):
         more["M_tip"] = np.asarray(co.M_tip(rpm / 60.0, D, air.a_sound), dtype=float)
     if {"CT", "CP"} <= series.values.keys():
-        still = np.abs(np.nan_to_num(V)) <= 0.0
         with np.errstate(all="ignore"):
-            fm = np.where(still & (series.CT > 0) & (series.CP > 0), co.FM(series.CT, series.CP), np.nan)
+            fm = np.asarray(co.FM(series.CT, series.CP, np.nan_to_num(V)), dtype=float)
             share = np.hypot(1.5 * series.u["CT"] / series.CT, series.u["CP"] / series.CP)
         more["FM"], u_more["FM"] = fm, np.abs(fm * share)
     if {"thrust_N", "power_W"} <= series.values.keys():

@@ -150,6 +150,8 @@ def _curves(page: CasePage) -> list[Plot]:
             traces += _points(page, "J", name, lambda r: near(r.rpm, own.rpm))
         title = f"{label[0].upper()}{label[1:]} over advance ratio at {own.rpm:g} rev/min"
         note = "The band ends at the limit of momentum theory." if name == "eta" else ""
+        if name == "eta" and math.isfinite(merit := float(co.FM(j.CT[0], j.CP[0], j.J[0]))):
+            note = f"{note} At rest, where it is zero, the figure of merit is {merit:.2f}."
         plots.append(Plot(title, "J = V / (n D) [-]", f"{label} [-]", traces, note=note))
     with np.errstate(divide="ignore", invalid="ignore"):
         per_kW: Any = np.where(w.power_W > 0, 1e3 * w.thrust_N / w.power_W, np.nan)

@@ -22,6 +22,7 @@ from typing import Any
 import bemt
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import csv_text, file_hash, json_text, number_of, number_text, text_table, write_atomic
+from bemt.physics import coefficients as co
 from bemt.results.sweep.rows import ROW_SOURCES, Fan, GridResult, PairResult, Result, Row, Sweep
 
 # Tables of a sweep for terminals and spreadsheets.
@@ -55,7 +56,7 @@ def _u_val(row: Row) -> str:
 
 
 def _main_table(result: Result) -> str:
-    header = ["source", "rpm", "V m/s", "T kgf", "T N", "u N", "Q N m", "CT", "CP", "M_tip", "Re75",
+    header = ["source", "rpm", "V m/s", "T kgf", "T N", "u N", "Q N m", "CT", "CP", "FM", "M_tip", "Re75",
               "BEMT err %", "K1K2 err %", "u_val N", "flags"]  # fmt: skip
     notes: list[str] = []
     body = []
@@ -68,7 +69,8 @@ def _main_table(result: Result) -> str:
         body.append([
             row.label, f"{row.rpm:g}", f"{row.airspeed_m_s:g}", _kgf(row.thrust_kgf), _n(row.thrust_N),
             _u(row.u), _n(row.torque_Nm),
-            _n(row.CT), _n(row.CP), _n(row.M_tip, 3), _n(row.Re, 3), _pct(row.bemt_error_pct),
+            _n(row.CT), _n(row.CP), _n(co.FM(row.CT, row.CP, row.airspeed_m_s), 3), _n(row.M_tip, 3), _n(row.Re, 3),
+            _pct(row.bemt_error_pct),
             _pct(row.k1k2_error_pct), _u_val(row), ",".join(marks),
         ])  # fmt: skip
     if angle := result.at.angle_deg:

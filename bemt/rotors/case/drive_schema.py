@@ -91,7 +91,7 @@ class MotorTable(Table):
         "instead: share of the voltage lost in the winding at full throttle", "", 0.0, 0.6
     )
     size: float = entry(
-        "without either: ln of the resistance over that usual for K_v and cells, or K_v and mass", "", -3.0, 3.0,
+        "without either: ln of the resistance over that usual for the current, or for K_v and mass", "", -3.0, 3.0,
         default=0.0,
     )  # fmt: skip
     mass_g: float | None = entry("mass of the motor", "g", 0.5, 1e5)

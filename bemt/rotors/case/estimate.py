@@ -18,6 +18,7 @@ from bemt.base.given import numbers
 from bemt.base.tables import number_text, or_null, speed_text, text_table
 from bemt.base.units import INCH, KGF
 from bemt.data.readers.uiuc_names import find_family
+from bemt.physics import coefficients as co
 from bemt.physics.bem.model import HUB_LOADS
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case import Case, case_of, fresh
@@ -154,8 +155,8 @@ def _of_label(
         "u95_thrust_N": found.half_width95("thrust_N"), "power_W": points.power_W, "u_power_W": points.u["power_W"],
         "u95_power_W": found.half_width95("power_W"), "u_reading_thrust_N": found.u_reading("thrust_N"),
         "u_reading_power_W": found.u_reading("power_W"), "J": points.J, "CT": points.CT, "CP": points.CP,
-        "M_tip": points.M_tip, "Re75": points.Re75, "k1k2_thrust_N": simple.thrust_N,
-        "torque_Nm": points.torque_Nm, "u_torque_Nm": points.u["torque_Nm"],
+        "FM": co.FM(points.CT, points.CP, V), "M_tip": points.M_tip, "Re75": points.Re75,
+        "k1k2_thrust_N": simple.thrust_N, "torque_Nm": points.torque_Nm, "u_torque_Nm": points.u["torque_Nm"],
         **{key: points.values.get(key, np.where(points.converged, 0.0, np.nan)) for key in HUB_LOADS},
     }  # fmt: skip
     given = EstimateInput(
@@ -217,10 +218,12 @@ class RotorEstimate(Dataset):
     def text(self) -> str:
         """The rows as a table, with what not to trust below."""
         head = ["rpm", "V [m/s]", "T [N]", "± 68 %", "± 95 %", "on a stand", "P [W]", "± 68 %", "± 95 %", "on a stand",
-                "K1/K2 [N]", "J", "M tip"]  # fmt: skip
+                "K1/K2 [N]", "J", "FM", "M tip"]  # fmt: skip
         keys: tuple[str, ...] = ("rpm", "airspeed_m_s", "thrust_N", "u_thrust_N", "u95_thrust_N", "u_reading_thrust_N",
                                  "power_W", "u_power_W", "u95_power_W", "u_reading_power_W", "k1k2_thrust_N", "J",
-                                 "M_tip")  # fmt: skip
+                                 "FM", "M_tip")  # fmt: skip
+        empty = [key for key in ("J", "FM") if not np.nan_to_num(self.columns[key]).any()]  # all at rest, or in flight
+        head, keys = [h for h in head if h not in empty], tuple(k for k in keys if k not in empty)
         if self.columns["angle_deg"].any():
             head[2:2], keys = ["angle [deg]", "H [N]"], (*keys[:2], "angle_deg", "H_force_N", *keys[2:])
         shown = {key: [number_text(x, 2 if key.startswith("u") else 4) for x in self.columns[key]] for key in keys}
@@ -236,6 +239,8 @@ class RotorEstimate(Dataset):
         notes = ["± 68 and 95 %: the rotor itself; on a stand: what yours may show, ± 68 %"]
         if g.source:
             notes.append(f"as measured: {g.source}")
+        if g.known_from == "label" and g.series is None and (open_ := fresh.open_kind(g.label, g.blades)):
+            notes.append(open_)
         if g.pitch_in > SWAPPED * g.diameter_in:
             notes.append(f"! a label is diameter x pitch: is it {g.pitch_in:g}x{g.diameter_in:g}?")
         notes += [f"! {flag}" for flag in counted([list(flags) for flags in self.flags])]

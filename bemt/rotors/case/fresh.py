@@ -19,6 +19,7 @@ from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V
 from bemt.rotors.case.reading import parse_reading
 from bemt.rotors.case.unknowns import (
     AIR,
+    CLASS_CHORD,
     DRIVE,
     FAN,
     HUB,
@@ -32,7 +33,7 @@ from bemt.rotors.case.unknowns import (
 )
 from bemt.rotors.measured import MeasuredRotor, find, records
 from geometry.common import GeometryError
-from geometry.designation import Designation, blade_class, parse_designation
+from geometry.designation import ENDINGS, Designation, blade_class, parse_designation
 
 if TYPE_CHECKING:
     from bemt.data.readers.stations import BladeStations
@@ -118,6 +119,22 @@ def read_label(label: str, blades: int | None = None) -> Designation:
     return replace(found, blades=blades or found.blades or 2)
 
 
+def open_kind(label: str, blades: int | None = None) -> str:
+    """What a label leaves open that states no kind of blade, and which series were measured in its size; else empty.
+
+    >>> open_kind("APC 10x5E"), open_kind("APC 10x5").rpartition(": ")[2]
+    ('', 'APC Thin Electric')
+    """
+    told = read_label(label, blades)
+    if told.blade_class or class_of(family_of(told.maker, None, told.blades)):
+        return ""
+    same = {FAMILIES.get(one.family, one.family) for one in records().values() if one.has_size(told)}
+    kin = sorted({name for name in same if told.maker.casefold() in name.casefold()} or same)
+    endings = ", ".join(sorted(letters.upper() for letters, kind in ENDINGS.items() if kind in CLASS_CHORD))
+    measured = f"; measured in this size (--series): {', '.join(kin)}" if kin else ""
+    return f"no ending ({endings}): the kind of blade is open and changes the answer{measured}"
+
+
 def case_name(text: str) -> str:
     """Name of a case, fit for a folder, from a label or a file."""
     return re.sub(r"[^A-Za-z0-9_.-]", "_", text).strip("._-") or "rotor"
@@ -153,7 +170,7 @@ sag = {sag:g}  # or resistance_mohm, of the pack with leads
 # capacity_Ah = 2.2  # for the flight time
 
 [drive.motor]
-size = {size:g}  # a winding usual for K_v and cells. Better: replace this line by resistance_mohm, mass_g or stator
+size = {size:g}  # a winding usual for its current. Better: replace this line by resistance_mohm, mass_g or stator
 idle_share = {idle:g}  # of the current. Better: replace this line by no_load_A, from the motor's sheet
 
 # [drive.vehicle]  # for hover

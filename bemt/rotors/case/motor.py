@@ -1,9 +1,11 @@
-"""The motor of a drive that states no winding: a class by K_v, cells and, if given, mass or stator; motors by name.
+"""The motor of a drive that states no winding: as large as its propeller asks, or of its mass; motors by name.
 
 What Drive Calculator's motors lose with a propeller acts as one resistance, (U - n/K_v)/I: the warm winding, switches
-and leads together. Its median for each of 611 motors (every other one, by a checksum of the maker's name) was fitted
-to K_v and voltage, or to K_v and mass; of 491 others it gives the current with a median error of 21 % (no mass) and
-11 % (with it), where a motor as large as the propeller needs gave 21 % with a bias of 14 %.
+and leads together. It goes with the current of full throttle alone, I^-0.70: to K_v and voltage nothing is left. The
+exponent was fitted to 612 motors (every other one, by a checksum of the maker's name). On 494 others the current is off
+by 12.9 % in the median; a law of K_v and voltage gave 16.9 %, the mass that the torque asks for 16.7 % with a bias of
+-11 %. Where the mass is known it tells more, 6.8 %, and is the same motor whatever it turns: propellers on one motor
+are compared by that.
 """
 
 from __future__ import annotations
@@ -20,20 +22,22 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V, DriveTable
+from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V, MotorTable
 
 if TYPE_CHECKING:
     from bemt.rotors.case.load import Case
 
-# ln R = a + b ln K_v + c ln U, and with the mass instead, ln R = a + b ln K_v + c ln m [ohm, rev/min/V, V, g].
-_BY_VOLTAGE, _BY_MASS = (1.492, -0.095, -1.153), (9.169, -0.907, -1.076)
-SCATTER, SCATTER_MASS, SCATTER_STATOR = 0.75, 0.31, 0.33
-"""Scatter of ln R around the class by voltage, by mass and by stator size [1]."""
+_BY_CURRENT = -0.70
+"""Exponent of the current at full throttle, at rest; 1 A: 1.00 ohm [1]."""
+_BY_MASS = (9.169, -0.907, -1.076)  # ln R = a + b ln K_v + c ln m [ohm, rev/min/V, g]
+SCATTER, SCATTER_MASS = 0.45, 0.31
+"""Scatter of ln R around the law by current, and by mass or stator: 69 and 92 % of the currents of motors that were not
+fitted lie within one and two [1]."""
 # Mass of a motor by its stator, m = exp(a) (d^2 h)^b [g, mm]: 640 motors of T-Motor, SunnySky, iFlight, EMAX and
 # Scorpion in setuav-pythrust, scatter 0.1.
 _STATOR = (-3.9, 0.91)
 _SPEEDS = np.linspace(0.2, 1.0, 65)
-"""Speeds over that without load between which full throttle is sought [1]."""
+"""Speeds over K_v times the voltage between which full throttle is sought [1]."""
 
 
 def stator_mass_g(stator: str) -> float:
@@ -56,51 +60,59 @@ def resistance_of_mass(kv: Array | float, mass_g: Array | float) -> Array:
     return np.asarray(np.exp(a + b * np.log(kv) + c * np.log(mass_g)))
 
 
-def class_resistance(table: DriveTable) -> float:
-    """Resistance of winding, controller and leads together, of the class of a motor [ohm].
+def class_resistance(amps: Array | float, kv: Array | float = math.nan, mass_g: Array | float = math.nan) -> Array:
+    """Resistance of winding, controller and leads together of a motor of which the winding is not known [ohm].
 
-    >>> round(1e3 * class_resistance(DriveTable(kv=900, cells=3)))
-    139
+    By K_v and mass where that is known, else by the current at full throttle and rest [A].
+
+    >>> [round(1e3 * float(class_resistance(*known))) for known in ((10.0,), (10.0, 900.0, 54.0))]
+    [200, 274]
     """
-    m = table.motor
-    mass = m.mass_g if m.mass_g is not None else None if m.stator is None else stator_mass_g(m.stator)
-    if mass is not None:
-        a, b, c = _BY_MASS
-        usual = a + b * math.log(table.kv) + c * math.log(mass)
-    else:
-        volts = table.cells * float(np.interp(table.soc, LIPO_SOC, LIPO_V)) * (1.0 - (table.battery.sag or 0.0))
-        usual = math.log(float(usual_resistance(table.kv, volts)))
-    return math.exp(usual + m.size)
+    usual = np.asarray(amps, dtype=float) ** _BY_CURRENT
+    return np.asarray(np.where(np.isnan(mass_g), usual, resistance_of_mass(kv, mass_g)))
 
 
-def usual_resistance(kv: Array | float, volts: Array | float) -> Array:
-    """Resistance of motors of which only K_v [rev/min/V] and the loaded voltage are known [ohm]."""
-    a, b, c = _BY_VOLTAGE
-    return np.asarray(np.exp(a + b * np.log(kv) + c * np.log(volts)))
+def known_mass_g(motor: MotorTable) -> float:
+    """Mass that a case states of its motor, by itself or by its stator; NaN: not known [g]."""
+    if motor.mass_g is not None:
+        return motor.mass_g
+    return math.nan if motor.stator is None else stator_mass_g(motor.stator)
 
 
 def full_speed(case: Case) -> float:
-    """Speed at full throttle of a case with a table [drive] whose battery states its sag [rev/min].
+    """Speed at full throttle of a case with a table [drive] that states none of its losses in ohm [rev/min].
 
-    Where the motor's torque k I (1 - idle share), I = (U - n/K_v)/R, meets the rotor's.
+    At rest U (1 - sag) - n/K_v = R I with I = Q/(k (1 - idle share)) tells motor and battery, which it keeps in flight.
     """
     from bemt.rotors.case.prepare import prepare_case
 
     t = case.file.drive
     assert t is not None  # the caller asks for a drive
-    volts = t.cells * float(np.interp(t.soc, LIPO_SOC, LIPO_V)) * (1.0 - (t.battery.sag or 0.0))
-    free, k = t.kv * volts, 30.0 / (math.pi * t.kv)
-    rpm = free * _SPEEDS
-    V = np.full(rpm.size, case.airspeed_m_s)
-    air = case.air()
-    load = prepare_case(case, alone=True).at_speeds(rpm, V, air).solve(rpm, V, air).torque_Nm
-    amps = (volts - rpm / t.kv) / class_resistance(t)
-    more = k * (1.0 - (t.motor.idle_share or 0.0)) * amps - load
-    drives = np.flatnonzero(more > 0.0)
-    if not drives.size or drives[-1] + 1 == rpm.size:
-        return float(rpm[0] if not drives.size else free)
-    i = drives[-1]
-    return float(rpm[i] + (rpm[i + 1] - rpm[i]) * more[i] / (more[i] - np.nan_to_num(more[i + 1])))
+    volts, k = t.cells * float(np.interp(t.soc, LIPO_SOC, LIPO_V)), 30.0 / (math.pi * t.kv)
+    sag, idle = t.battery.sag or 0.0, t.motor.idle_share or 0.0
+    rpm, air, prepared = t.kv * volts * _SPEEDS, case.air(), prepare_case(case, alone=True)
+
+    def load(airspeed_m_s: float) -> Array:
+        V = np.full(rpm.size, airspeed_m_s)
+        return np.asarray(prepared.at_speeds(rpm, V, air).solve(rpm, V, air).torque_Nm / k)
+
+    amps = np.maximum(load(0.0), 1e-9) / (1.0 - idle)
+    lost = math.exp(t.motor.size) * amps * class_resistance(amps, t.kv, known_mass_g(t.motor))
+    n = _last_above(rpm, (1.0 - sag) * volts - rpm / t.kv - lost)
+    if not case.airspeed_m_s:
+        return n
+    full_A = float(np.interp(n, rpm, amps))
+    ohm = (sag * volts + float(np.interp(n, rpm, lost))) / full_A
+    return _last_above(rpm, volts - rpm / t.kv - ohm * (load(case.airspeed_m_s) + idle * full_A))
+
+
+def _last_above(x: Array, y: Array) -> float:
+    """Where y leaves its last positive value for zero; an end of x where it has none, or ends with it."""
+    above = np.flatnonzero(y > 0.0)
+    if not above.size or above[-1] + 1 == x.size:
+        return float(x[-1 if above.size else 0])
+    i = above[-1]
+    return float(x[i] + (x[i + 1] - x[i]) * y[i] / (y[i] - np.nan_to_num(y[i + 1])))
 
 
 @dataclass(frozen=True)

@@ -93,7 +93,9 @@ def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str], list
             if isinstance(item.nominal, int | float)]  # fmt: skip
     assumed = [f"assumed, with ranges in case.toml: {', '.join(told)}"] if wanted.fan and told else []
     unused = re.findall(r"^# (column .*)$", files["case.toml"].decode(), re.M)
-    return folder, sorted(files), [*assumed, *notes, *unused]
+    bare = wanted.label and not (wanted.stations or wanted.scan or wanted.fan or wanted.series)
+    kind = [line for line in [fresh.open_kind(str(wanted.label), wanted.blades)] if line] if bare else []
+    return folder, sorted(files), [*assumed, *kind, *notes, *unused]
 
 
 def _of_motor(fault: Fault, wanted: Wanted) -> Fault:

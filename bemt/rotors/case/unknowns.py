@@ -92,9 +92,9 @@ DRIVE = (
         "drive.battery.sag", 0.06, 0.01, 0.13, "battery not known; loses 3 to 10 % of its voltage at full throttle"
     ),
     Unknown(
-        "drive.motor.size", 0.0, -1.3, 1.3,
-        "motor not known; resistance with controller and leads is half to twice the usual for K_v and cells in two of "
-        "three of 611 motors. Its mass_g narrows that to 0.7 to 1.4",
+        "drive.motor.size", 0.0, -0.78, 0.78,
+        "motor not known; resistance with controller and leads is 0.64 to 1.6 times the usual for its current in two "
+        "of three of 494 motors. Its mass_g narrows that to 0.7 to 1.4",
     ),
     Unknown(
         "drive.motor.idle_share", 0.073, 0.03, 0.14, f"motor not known; losses take 5 to 11 % of the current{_MOTORS}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, Any, Literal
 
-from bemt.base.action import Count, action
+from bemt.base.action import Cells, Count, action
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -24,7 +24,7 @@ __all__ = ["choose", "design"]
     common=("thrust_N", "cells", "mass_kg", "rotors", "airspeed_m_s", "max_diameter_in", "kv", "out"),
 )  # fmt: skip
 def choose(
-    thrust_N: float | None = None, cells: Count | None = None, *, kv: tuple[float, float] | float = (80.0, 8000.0),
+    thrust_N: float | None = None, cells: Cells | None = None, *, kv: tuple[float, float] | float = (80.0, 8000.0),
     motors: Path | Sequence[Path | KnownMotor] = (),
     labels: str | Sequence[str] = (), blades: Count | Sequence[Count] = (2,),
     mass_kg: float | None = None, rest_kg: float | None = None, rotors: Count = 1, airspeed_m_s: float = 0.0,
@@ -39,7 +39,7 @@ def choose(
     thrust_N : float, optional
         Thrust of one rotor at full throttle; twice the hover thrust if only the mass is given. [N]
     cells : int
-        LiPo cells in series.
+        LiPo cells in series, as 3 or 3S.
     kv : float or (low, high)
         Speed constant, or the range of which 72 are tried. [rev/min/V]
     motors : path or name, or sequence of them or of KnownMotor

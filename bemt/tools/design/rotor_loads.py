@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -40,6 +41,7 @@ class RotorLoads:
     a_sound: float  # [m/s]
     # Thrust above which the blades are too narrow not to cavitate in water at 1 m of depth [N]
     keller_N: float = math.inf
+    rest: RotorLoads | None = None  # The same at rest, where this is in flight
 
     def speed_for(self, thrust_N: Array) -> Array:
         """Speed that gives a thrust, NaN where none in the table does. [rev/min]"""
@@ -93,7 +95,11 @@ def rotor_loads(
     label: str, rpm_max: float, airspeed_m_s: float, air: Air | None = None, fluid: str = "air", coaxial: bool = False
 ) -> RotorLoads | None:
     """Solve a label over speed; None where too few speeds converge. Of a coaxial pair each rotor has half."""
-    return loads_of_case(label, case_of_label(label, fluid, coaxial), rpm_max, airspeed_m_s, air)
+    case = case_of_label(label, fluid, coaxial)
+    found = loads_of_case(label, case, rpm_max, airspeed_m_s, air)
+    if found is None or not airspeed_m_s:
+        return found
+    return dataclasses.replace(found, rest=loads_of_case(label, case, rpm_max, 0.0, air))
 
 
 def loads_of_case(

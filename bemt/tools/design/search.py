@@ -6,10 +6,9 @@ form:
     I = Q/k + I_0,   d^2 R_b I - d V_oc + k Omega + R I = 0,   P = (V_oc - R_b d I) d I
 
 with the smaller root d, the duty; the thrust is out of reach where d is above 1 or not real. A motor that is tried by
-its K_v weighs what its torque at the target asks for (:mod:`bemt.tools.design.motors_file`), and has the resistance of
-its class by K_v and mass (`bemt.rotors.case.motor`); one of a list without a resistance has that of its class by K_v
-and voltage, as in `drive`. Idle current and battery take the
-shares at full throttle that `bemt.rotors.case.unknowns` declares (3582 points of 1088 recorded motors):
+its K_v weighs what its torque at the target asks for (:mod:`bemt.tools.design.motors_file`). The resistance of one that
+states none is that of its class (`bemt.rotors.case.motor`), as in `drive`. Idle current and battery take the
+shares at full throttle and rest that `bemt.rotors.case.unknowns` declares (3582 points of 1088 recorded motors):
 
     k Omega_full = (1 - sag) V_oc - R I_full,   I_full = Q_full / (k (1 - idle)).
 
@@ -37,7 +36,7 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.units import G0, INCH
 from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V
-from bemt.rotors.case.motor import SCATTER, SCATTER_MASS, resistance_of_mass, usual_resistance
+from bemt.rotors.case.motor import SCATTER, SCATTER_MASS, class_resistance
 from bemt.rotors.case.unknowns import DRIVE, ESC_DROP
 from bemt.tools.design import motors_file, rotor_loads
 from bemt.tools.design.motors_file import KnownMotor
@@ -405,38 +404,29 @@ class _Chain:
         return duty, bus, (self.voc - self.battery_ohm * bus) * bus
 
 
-def _driven(amps: Array) -> Array:
-    """NaN where the air turns the rotor at full throttle: it says nothing about the motor's size."""
-    return np.where(amps > 0.0, amps, math.nan)
-
-
-def _chain(
-    loads: RotorLoads, machines: Sequence[KnownMotor], target: Target, motor_kg: float | None, draws: int = DRAWS
-) -> _Chain:
+def _chain(loads: RotorLoads, machines: Sequence[KnownMotor], target: Target, draws: int = DRAWS) -> _Chain:
     share = {
         name: np.interp(u[: draws + 1], [0.0, 0.5, 1.0], [item.low, item.value, item.high])
         for (name, item), u in zip(SHARES.items(), _draws()[1], strict=True)
     }
     sag, idle, lost = share["sag"], share["idle_share"], share["drop"]
-    kv, ohm, no_load = (np.array([[getattr(m, f)] for m in machines]) for f in ("kv", "resistance_ohm", "no_load_A"))
+    kv, told, no_load, mass = (
+        np.array([[getattr(m, f)] for m in machines]) for f in ("kv", "resistance_ohm", "no_load_A", "mass_g")
+    )
     k, loaded = 30.0 / (math.pi * kv), (1.0 - sag) * target.voc
-    if motor_kg is None:  # with controller and leads
-        usual = usual_resistance(kv, loaded) * np.exp(share["size"])
-    else:
-        usual = resistance_of_mass(kv, 1e3 * motor_kg) * np.exp(share["size"] * SCATTER_MASS / SCATTER)
-    lost, ohm = np.where(np.isnan(ohm), 0.0, lost), np.where(np.isnan(ohm), usual, ohm)
-    full = np.minimum((0.9 - lost) * loaded / k * 30.0 / math.pi, loads.rpm[-1])
-    amps = loads.torque_at(full) / k / (1.0 - idle)
+    size = np.exp(share["size"] * np.where(np.isnan(mass), 1.0, SCATTER_MASS / SCATTER))
+    lost, rest = np.where(np.isnan(told), 0.0, lost), loads.rest or loads
+    full = np.minimum((0.9 - lost) * loaded / k * 30.0 / math.pi, rest.rpm[-1])
     for _ in range(80):
+        amps = rest.torque_at(full) / k / (1.0 - idle)
+        ohm = np.where(np.isnan(told), size * class_resistance(amps, kv, mass), told)
         old, new = full, np.maximum(((1.0 - lost) * loaded - ohm * amps) / k * 30.0 / math.pi, 1.0)
-        full = 0.7 * full + 0.3 * np.minimum(new, loads.rpm[-1])
-        amps = loads.torque_at(full) / k / (1.0 - idle)
+        full = 0.7 * full + 0.3 * np.minimum(new, rest.rpm[-1])
         if np.nanmax(np.abs(full - old)) < SETTLED:
             break
-    winding = lost * loaded / _driven(amps) + ohm
-    amps = _driven(amps)
-    rest = np.where(np.isnan(no_load), idle * amps, no_load)
-    return _Chain(k, winding, rest, sag * target.voc / amps, target.voc)
+    winding = lost * loaded / amps + ohm
+    idle_A = np.where(np.isnan(no_load), idle * amps, no_load)
+    return _Chain(k, winding, idle_A, sag * target.voc / amps, target.voc)
 
 
 def _rows(
@@ -452,7 +442,7 @@ def _rows(
             heavier = np.exp(min(float(parts.u) / own_kg, 1.0) * z[2]) if target.told_rest else np.ones(draws + 1)
             at = G0 * (target.rest_kg / target.rotors + own_kg * heavier)[None, :]
             asked = asked if target.fixed else 2.0 * at
-    chain = _chain(loads, machines, target, float(parts.motor) if target.sized else None, draws)
+    chain = _chain(loads, machines, target, draws)
     own = _Chain(chain.k, chain.ohm[:, :1], chain.idle_A[:, :1], chain.battery_ohm[:, :1], chain.voc)
     duty, bus, _ = own.at(loads.rpm[None, :], loads.torque_Nm[None, :])
     reach = np.isfinite(duty)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, Literal
 
-from bemt.base.action import Count, Told, action
+from bemt.base.action import Cells, Count, Told, action
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ __all__ = ["drive", "map", "motor", "thrusters"]
     common=("motor", "kv", "cells", "mass_kg", "rotors", "capacity_Ah", "reading", "out"),
 )  # fmt: skip
 def drive(
-    case: Propeller | Path = ".", *, motor: str | None = None, kv: float | None = None, cells: Count | None = None,
+    case: Propeller | Path = ".", *, motor: str | None = None, kv: float | None = None, cells: Cells | None = None,
     motor_mass_g: float | None = None, resistance_mohm: float | None = None, no_load_A: float | None = None,
     mass_kg: float | None = None, rotors: Count | None = None,
     capacity_Ah: float | None = None, airspeed_m_s: float = 0.0, reading: str | None = None, off: Sequence[str] = (),
@@ -41,7 +41,7 @@ def drive(
     kv : float, optional
         Speed constant of the motor; from the case's table [drive] by default, like all that follows. [rev/min/V]
     cells : int, optional
-        LiPo cells in series.
+        LiPo cells in series, as 3 or 3S.
     motor_mass_g : float, optional
         Mass of the motor, which tells its winding. [g]
     resistance_mohm : float, optional

@@ -45,7 +45,7 @@ from bemt.physics.effects.motor_heating import COPPER, MAGNET
 from bemt.rotors.case import Case
 from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V, DriveTable
 from bemt.rotors.case.lattice import SPEEDS
-from bemt.rotors.case.motor import class_resistance
+from bemt.rotors.case.motor import class_resistance, known_mass_g
 
 # Thrust and torque of a rotor over speed, for the drive: from a case by BEMT, or from coefficients.
 
@@ -358,10 +358,10 @@ class Drive:
 
 # The drive of a case: its battery, ESC and motor around its rotor, with whatever a label leaves open filled in.
 #
-# A case that states no winding has that of its class (`bemt.rotors.case.motor`), whatever the rotor; one that states
-# the share of voltage or current that is lost at full throttle has the ohms and amperes of a motor that is as large as
-# this rotor needs. The motor does not change with an unknown of the rotor: it is the same motor, whatever the blade
-# turns out to be.
+# A case that states no winding has that of its class (`bemt.rotors.case.motor`); one that states the share of voltage
+# or current that is lost at full throttle has the ohms and amperes of a motor that is as large as this rotor needs at
+# rest. The motor does not change with an unknown of the rotor or with airspeed: it is the same motor, whatever the
+# blade turns out to be.
 
 ROTOR_DENSITY = 0.06
 """Mass of a plastic two-blade propeller over its diameter squared: declared. [kg/m2]"""
@@ -395,12 +395,12 @@ def inertia_kg_m2(case: Case) -> float:
     return ROTOR_DENSITY * case.diameter_m**2 * (0.5 * case.diameter_m) ** 2 / 9.0 * case.file.rotor.blades
 
 
-def drive_of(case: Case, rotor: RotorMap) -> Drive:
-    """Drive of a case; shares are taken at full throttle and the stated charge with the rotor that is given."""
+def drive_of(case: Case, rotor: RotorMap, rest: RotorMap | None = None) -> Drive:
+    """Drive of a case; shares are taken at full throttle and the stated charge, with the rotor at rest if given."""
     t = drive_table(case)
     m, e = t.motor, t.esc
     henry = None if m.inductance_uH is None else m.inductance_uH * 1e-6
-    battery, winding, idle, bridge = _losses(t, rotor)
+    battery, winding, idle, bridge = _losses(t, rest or rotor)
     esc = Esc(
         e.pulse_min_us, e.pulse_max_us, e.exponent, bridge, e.idle_A,
         math.inf if e.current_limit_A is None else e.current_limit_A, e.braking == "yes", e.brake_on_stop,
@@ -422,12 +422,13 @@ def _losses(t: DriveTable, rotor: RotorMap) -> tuple[float, float, float, float]
     volts, k = float(battery_of(t).voc(t.soc)), 30.0 / (math.pi * t.kv)
     stated = None if t.battery.resistance_mohm is None else t.vehicle.rotors * t.battery.resistance_mohm * 1e-3
     ohm = None if t.motor.resistance_mohm is None else t.motor.resistance_mohm * 1e-3
-    if ohm is None and t.motor.winding_drop is None:
-        ohm = class_resistance(t)
+    mass, of_class = known_mass_g(t.motor), ohm is None and t.motor.winding_drop is None
     sag, drop, share = t.battery.sag or 0.0, t.motor.winding_drop or 0.0, t.motor.idle_share or 0.0
     more, lost = t.esc.resistance_mohm * 1e-3, t.esc.drop or 0.0
     amps = 1e-3
     for _ in range(200):
+        if of_class:
+            ohm = math.exp(t.motor.size) * float(class_resistance(amps, t.kv, mass))
         loaded = volts * (1.0 - sag) if stated is None else volts - stated * (amps + t.esc.idle_A)
         emf = loaded * (1.0 - lost) - more * amps - (loaded * drop if ohm is None else ohm * amps)
         load = float(rotor.torque(max(emf, 0.0) / k)) / k

@@ -265,21 +265,26 @@ def _carried(
     """Answers with their bands: unknowns and errors of the rotor through the drive, then unknowns of the drive."""
     if airspeed_m_s:
         case.axial_only()
-    rpm, V = drive_model.points(case.diameter_m, 1.02 * drive_model.rpm_max(case), airspeed_m_s)
+    fastest = 1.02 * drive_model.rpm_max(case)
+    rpm, V = drive_model.points(case.diameter_m, fastest, airspeed_m_s)
     found = propagate(case, rpm, V, angle_deg=0.0, bands=bands)
     rho, inertia = float(case.air().rho), drive_model.inertia_kg_m2(case)
 
     def rotor(loads: Mapping[str, Array]) -> RotorMap:
         return drive_model.from_loads(case, rpm, V, loads["thrust_N"], loads["torque_Nm"], rho, inertia)
 
-    own = rotor(found.nominal)
-    drive = drive_model.drive_of(case, own).without(*off)
+    own, at_rest = rotor(found.nominal), None
+    if airspeed_m_s:
+        still = drive_model.points(case.diameter_m, fastest, 0.0)
+        loads = propagate(case, *still, angle_deg=0.0, bands=False).nominal
+        at_rest = drive_model.from_loads(case, *still, loads["thrust_N"], loads["torque_Nm"], rho, inertia)
+    drive = drive_model.drive_of(case, own, at_rest).without(*off)
     if bands:
         values, by_origin = found.carry(lambda loads: ask(case, dataclasses.replace(drive, rotor=rotor(loads))))
     else:
         values, by_origin = ask(case, drive), {}
     unknown = [item for item in case.assumptions if item.key.startswith("drive.")] if bands else []
-    moved = vary(case, values, lambda c, _: ask(c, drive_model.drive_of(c, own).without(*off)), unknown)
+    moved = vary(case, values, lambda c, _: ask(c, drive_model.drive_of(c, own, at_rest).without(*off)), unknown)
     nan = {key: np.full(np.shape(v), math.nan) for key, v in values.items()}
     rest = {key: sum((part[key] ** 2 for part in by_origin.values()), np.zeros(np.shape(v))) if bands else nan[key]
             for key, v in values.items()}  # fmt: skip
