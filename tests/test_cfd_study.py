@@ -286,10 +286,22 @@ def test_a_table_of_grids_is_kept_as_it_is_read(tmp_path: Path, monkeypatch: pyt
     monkeypatch.chdir(tmp_path)
     rows = "512000,6000,4.90,0.0861\n1730000,6000,5.15,0.0850\n5840000,6000,5.25,0.0845\n"
     Path("grids.csv").write_text("cells,rpm,thrust_N,torque_Nm\n" + rows)
+    Path("bare.csv").write_text("cells,thrust_N,torque_Nm\n" + rows.replace("6000,", ""))
     told = import_("grids.csv", out="study.toml").text
     assert "study.toml written. Next: bemt compare study.toml" in told and "no unit known" not in told
-    read = [import_(name).to_dict()["runs"][0]["points"] for name in ("grids.csv", "study.toml")]
-    assert read[0] == read[1]
+    assert "--rpm 6000" in import_("bare.csv", rpm=6000.0).text.split("Next:")[1]
+    import_("bare.csv", rpm=6000.0, out="stated.toml")  # the file keeps the speed that no column has
+    read = [import_(name).to_dict()["runs"][0] for name in ("grids.csv", "study.toml", "stated.toml")]
+    assert read[0]["points"] == read[1]["points"] == read[2]["points"] != []
+
+
+def test_a_recording_keeps_speeds_that_no_column_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("a.csv").write_text("rpm,thrust (N)\n4000,1\n6000,2\n8000,4\n")
+    import_("a.csv", airspeed_m_s=5.0, rpm=9000.0, out="kept.toml")
+    kept = import_file("kept.toml")
+    assert kept["airspeed_m_s"] == pytest.approx([5.0] * 3) and kept["rpm"] == pytest.approx([4e3, 6e3, 8e3])
+    assert any("rpm: ignored" in note for note in kept.notes)
 
 
 @pytest.mark.parametrize("head", ["cell size (mm)", "cell_size", "Base Size [mm]", "element_size", "dx_mm"])

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from diagnosing import CASES, case, diagnose, points, recording
 
+from bemt.judge.compare.one_run import compare_run
 from bemt.judge.diagnose import chain, other_rotor
 from bemt.judge.diagnose.assemble import build
 from bemt.judge.diagnose.load import load
@@ -49,6 +50,19 @@ def test_one_channel_in_another_unit_stays_a_finding_of_its_own() -> None:
     assert answer.decision.effects == ("unit_slip",)
     # a tenth of the load is low by nine tenths of the largest value, not by 900 %
     assert all(abs(share) <= 1.0 for share, _ in answer.off.values()) and abs(answer.where.size) <= 1.0
+
+
+@pytest.mark.parametrize("factor", [1 / 8.8507458, 0.2248, 8.8507458])
+def test_a_coefficient_has_no_unit(factor: float, tmp_path: Path) -> None:
+    """Off by the ratio of two units, it is still another rotor, to diagnose and to compare."""
+    values = recording(case(), points("grid"), noise=0.005).derive(case().diameter_m).values
+    rows = np.column_stack([values["rpm"], values["J"], values["CT"], factor * values["CQ"]])
+    file = tmp_path / "chart.csv"
+    file.write_text("rpm,J,K_T,K_Q\n" + "".join(",".join(f"{x:.6g}" for x in row) + "\n" for row in rows))
+    answer = chain.diagnose([load(str(file), case())], [case()])
+    assert "unit_slip" not in answer.decision.effects
+    assert not any("taken for Nm" in s.words for s in other_rotor.suspects(answer.problem))
+    assert "taken for" not in compare_run(str(file), case()).sentence
 
 
 def test_a_unit_is_told_where_the_rotor_is_another_one_as_well(tmp_path: Path) -> None:

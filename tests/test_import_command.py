@@ -298,14 +298,15 @@ def test_a_sensor_that_sticks_in_part_of_a_table_is_named_and_hides_no_slip_of_a
     stuck = [row if i < 10 else (row[0], 10.03, *row[2:]) for i, row in enumerate(TUNNEL)]
     both = [(n, V, T, round(100 * Q, 3)) for n, V, T, Q in stuck]
     cell = [row if i < 10 else (row[0], row[1], 6.98, row[3]) for i, row in enumerate(TUNNEL)]
+    four = [row if i < 11 else (row[0], row[1], 6.98, row[3]) for i, row in enumerate(TUNNEL)]
     typed = [(n, round(V / 2) * 2, T, Q) for n, V, T, Q in TUNNEL]
     one_V = [(n, 8.0, T, Q) for n, V, T, Q in TUNNEL if round(V) == 8] * 3
     told = {name: _tunnel(tmp_path / f"{name}.csv", rows) for name, rows in
-            (("sound", TUNNEL), ("stuck", stuck), ("both", both), ("cell", cell), ("typed", typed), ("one", one_V))}  # fmt: skip
+            (("sound", TUNNEL), ("stuck", stuck), ("both", both), ("cell", cell), ("four", four), ("typed", typed), ("one", one_V))}  # fmt: skip
     found = {name: {f["id"]: f for f in one["findings"]} for name, one in told.items()}
     assert all(not found[name] for name in ("sound", "typed", "one"))
     assert found["stuck"].keys() == {"stuck_sensor"} and found["stuck"]["stuck_sensor"]["rows"] == [10, 11, 12, 13, 14]
-    assert found["cell"]["stuck_sensor"]["channel"] == "thrust_N"
+    assert found["cell"]["stuck_sensor"]["channel"] == found["four"]["stuck_sensor"]["channel"] == "thrust_N"
     assert found["both"].keys() == {"stuck_sensor", "torque_unit"}
     assert "Ncm taken for Nm" in found["both"]["torque_unit"]["correction"]
     assert len(told["stuck"]["reduction"]["points"]) == 10

@@ -244,7 +244,8 @@ def test_the_columns_of_the_diagnosis_mean_what_they_say(seed: int, tmp_path: Pa
     ("values", "samples"),
     [
         ({"time_s": 0.02 * np.arange(60)}, True), ({"time_s": 5.0 * np.arange(60)}, False),
-        ({"time_s": 0.4 * np.arange(60)}, True), ({}, False),
+        ({"time_s": 0.4 * np.arange(60)}, True), ({}, True),
+        ({"CT": np.tile(np.linspace(0.1, 0.02, 20), 3)}, False),
         ({"pulse_width_s": np.repeat([1e-3, 1.2e-3, 1.4e-3], 20)}, True),
         ({"pulse_width_s": np.linspace(1e-3, 2e-3, 60)}, False),
         ({"time_s": 1.5 * np.arange(60), "throttle": np.repeat([0.2, 0.4, 0.6], 20)}, True),
@@ -304,6 +305,16 @@ def test_a_log_without_a_clock_is_no_list_of_points() -> None:
     rpm = np.repeat([3000.0, 6000.0, 4500.0], 20000) + rng.normal(0.0, 5.0, 60000)
     got = reduce(recording({"rpm": rpm, "thrust_N": K_T * rpm**2}))
     assert reduction(got).mode == "samples" and np.allclose(got["rpm"], [3000.0, 6000.0, 4500.0], rtol=1e-3)
+
+
+def test_stairs_need_no_clock() -> None:
+    """Rows in their order show the same plateaus; a sensor that reads every fifth row shows them, too."""
+    values = log(each=100)
+    values["thrust_N"][np.arange(len(values["time_s"])) % 5 > 0] = np.nan
+    bare = {k: v for k, v in values.items() if k in ("rpm", "thrust_N", "torque_Nm")}
+    known, got = (reduce(recording({**bare, **more})) for more in ({"time_s": values["time_s"]}, {}))
+    assert reduction(got).mode == "samples" and len(got) == len(known) == 7
+    assert np.allclose(got["rpm"], known["rpm"], rtol=1e-3)
 
 
 def test_repeats_give_the_scatter_and_only_they_show_outliers() -> None:

@@ -31,7 +31,7 @@ from bemt.physics.dataset import Dataset
 from bemt.results.report import book_html
 from bemt.results.report.book import About, Book, CasePage
 from bemt.results.report.diagnosis_block import answer, verdict
-from bemt.results.report.front import summary
+from bemt.results.report.front import front_parts, summary
 from bemt.results.report.gather import attach_diagnoses, gather, safe_files
 from bemt.results.report.plot import Mark, Plot, Trace, figure, ticks, viewer
 from bemt.results.sweep.rows import Comparison, Result, Row
@@ -592,6 +592,20 @@ def test_a_report_of_own_cases_holds_no_word_of_the_thesis(made: tuple[Book, Pat
 def test_the_head_says_whose_report_it_is(made: tuple[Book, Path]) -> None:
     page = book_html(replace(made[0], about=About("Fan <3>", "A. Body", "2026-11-22")))
     assert "<h1>Fan &lt;3&gt;</h1>" in page and "A. Body · 2026-11-22." in page
+    told = summary(replace(made[0], about=About("Fan <3>", "A. Body", "2026-11-22")))
+    assert told.startswith("# Fan &lt;3&gt;\n") and "A. Body · 2026-11-22." in told
+    one = Book("0", (CasePage(Result("one", title="My fan")),), 0)
+    assert summary(one).startswith("# My fan\n")
+
+
+def test_a_table_without_a_number_is_a_sentence() -> None:
+    failed = CasePage(Result("one", faults=("case.toml: got nothing",)))
+    solved = CasePage(Result("two", rows=(Row("bemt", "bemt", 4.75, rpm=6000.0, airspeed_m_s=0.0, u=0.4),)))
+    none, some = (Book("0", pages, 0) for pages in ((failed,), (failed, solved)))
+    for page, empty in ((none, True), (some, False)):
+        told, parts = summary(page), dict(front_parts(page, [f"case-{k}" for k in range(len(page.cases))]))
+        assert ("|" in told) != empty and (parts["table"] is None) == empty
+    assert "CFD" not in summary(some).split("##")[0], "a column that no case fills is not there"
 
 
 # ---- in a browser ---------------------------------------------------------------------------------------------------

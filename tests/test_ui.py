@@ -124,7 +124,7 @@ def test_the_page_answers_reads_and_judges(tab: Tab, tmp_path: Path) -> None:
     file.write_text("\n".join(["rpm,thrust_gf,torque_Nm", *rows]))
     tab.drop(file)
     tab.click("Diagnose")
-    head = bemt.diagnose(file, own).text.splitlines()[0]
+    head = " ".join(bemt.diagnose(file, own).text.partition("verdict: ")[0].split())
     until(lambda: head in tab.text, f"the sentence {head!r}")
     assert "DeltaGenerator" not in tab.text, "nothing of the page's own objects is shown"
     for width in (1400, 390):
@@ -138,6 +138,24 @@ def test_the_page_answers_reads_and_judges(tab: Tab, tmp_path: Path) -> None:
             time.sleep(3.0)
             raw = tab.call("Page.captureScreenshot", format="png")["data"]
             Path(folder, f"ui_{width}.png").write_bytes(base64.b64decode(raw))
+
+
+def test_a_workbook_of_several_sheets_asks_for_one(tab: Tab, tmp_path: Path) -> None:
+    pd = pytest.importorskip("pandas")
+    pytest.importorskip("openpyxl", reason="no writer of workbooks")
+    with pd.ExcelWriter(tmp_path / "two.xlsx") as book:
+        for name, thrust in (("before", 1.0), ("after it", 2.0)):
+            pd.DataFrame({"rpm": [4000, 5000], "thrust_N": [thrust, 1.5625 * thrust]}).to_excel(book, sheet_name=name)
+    until(lambda: "±" in tab.text, "the page")
+    tab.drop(tmp_path / "two.xlsx")
+    field = "[...document.querySelectorAll('[data-testid=stSelectbox]')].find(b => b.innerText.includes('tables'))"
+    until(lambda: tab.js(f"{field} !== undefined"), "the choice of a sheet")
+    tab.js(f"{field}.querySelector('input').focus()")
+    tab.call("Input.insertText", text="after it")
+    until(lambda: "after it" in str(tab.js("document.querySelector('[role=listbox]').innerText")), "its name")
+    for kind in ("keyDown", "keyUp"):
+        tab.call("Input.dispatchKeyEvent", type=kind, key="Enter", code="Enter", windowsVirtualKeyCode=13, text="\r")
+    until(lambda: "Diagnose" in tab.text, "the sheet")
 
 
 def test_a_wrong_label_is_told_and_nothing_breaks(tab: Tab) -> None:

@@ -114,36 +114,50 @@ def answer(st: Any, propeller: bemt.Propeller, rpm: float, V: float, motor: tupl
         st.code(found.text, language=None)
 
 
+def _read(path: Path) -> bemt.Dataset | tuple[str, ...]:
+    """What a file holds; the names of its tables where one has to be chosen."""
+    try:
+        return bemt.read(path)
+    except bemt.InputError as error:
+        if tables := error.faults[0].choices:
+            return tables
+        raise
+
+
 def recording(st: Any, propeller: bemt.Propeller) -> Any:
     """The recording that was dropped, read; None without one."""
     st.subheader("Your recording")
     file = st.file_uploader("Drop a bench log or a table (rpm, thrust_N, torque_Nm, ...)", key="recording")
     if file is None:
         return None
-    sheet = ""
-    if Path(file.name).suffix.lower() in (".xlsx", ".xlsm", ".xls", ".ods", ".zip"):
-        sheet = st.text_input("Sheet of the workbook, or file in the zip, where it has several", key="sheet").strip()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / Path(file.name).name
         path.write_bytes(file.getvalue())
-        path = path.with_name(f"{path.name}#{sheet}") if sheet else path
         try:
-            points = bemt.read(path)
+            points = _read(path)
+            if not isinstance(points, bemt.Dataset):  # sheets, or files in a zip
+                part = st.selectbox("It has several tables", points, None, placeholder="Choose one", key="part")
+                if part is None:
+                    return None
+                path = path.with_name(f"{path.name}#{part}")
+                points = bemt.read(path)
         except bemt.InputError as error:
             for fault in error.faults:
                 st.error(str(fault).replace(f"{folder}/", ""))
             return None
         for note in points.notes:
             st.caption(note)
-        st.dataframe(points.to_pandas(), height=180)
+        frame = points.to_pandas()
+        frame.attrs = {}  # what the page cannot send
+        st.dataframe(frame, height=180)
         if st.button("Diagnose", type="primary"):
             with st.spinner("Comparing with every effect and fault ..."):
                 found = bemt.diagnose(path, propeller)
-            head, _, rest = found.text.replace(f"{folder}/", "").partition("\n")  # commands name your file
+            head, mark, rest = found.text.replace(f"{folder}/", "").partition("verdict: ")  # commands name your file
             shown = st.success if found.verdict in ("named", "none") else st.info
-            shown(head)
+            shown(" ".join(head.split()))
             with st.expander("The whole answer", expanded=True):
-                st.code(rest, language=None)
+                st.code(mark + rest, language=None, wrap_lines=True)
     return points
 
 
@@ -156,8 +170,8 @@ def exports(st: Any, propeller: bemt.Propeller) -> None:
     if right.button("Export"):
         with tempfile.TemporaryDirectory() as folder:
             written = bemt.export(propeller, folder, chosen)
-            right.code(written.text.replace(folder, "."), language=None)
-            right.download_button("Download", archive(Path(folder)), f"{propeller.name}_{chosen}.zip")
+            st.code(written.text.replace(folder, "."), language=None)
+            st.download_button("Download", archive(Path(folder)), f"{propeller.name}_{chosen}.zip")
     with st.expander("Sources of this answer"):
         for source in bemt.cite(propeller):
             st.markdown(f"**{source.name}** ({source.kind}): {source.source}")
@@ -179,7 +193,8 @@ def main() -> None:
         measured = recording(st, propeller)
         left, right = st.columns(2)
         with left:
-            over = propeller.solve(np.linspace(0.3, 1.3, 14) * rpm, V)
+            own = np.zeros(1) if measured is None or "rpm" not in measured else measured["rpm"]
+            over = propeller.solve(np.linspace(0.3 * rpm, max(1.3 * rpm, float(np.nanmax(own))), 14), V)
             curve(st, over, "rpm", "thrust_N", ("rev/min", f"thrust [N] at {V:g} m/s"), measured)
         with right:
             along = propeller.curve(rpm, np.linspace(0.0, 0.8, 14))

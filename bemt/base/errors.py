@@ -42,6 +42,8 @@ class Fault:
         What would have been right.
     hint : str
         How to repair it; may be empty.
+    choices : tuple of str
+        Names of which one is expected, where a program may ask; not printed.
 
     Examples
     --------
@@ -56,6 +58,7 @@ class Fault:
     got: str
     expected: str
     hint: str = ""
+    choices: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         head = "".join(f"{part}: " for part in (self.file, self.where) if part)

@@ -131,12 +131,8 @@ def import_(
         if out is None:  # no command takes these two: a file keeps them
             hint = f"Add --out {Path(table).with_name('recording.toml').as_posix()}"
             raise InputError(Fault("", "--out", "nothing", "a recording.toml that keeps what you state", hint))
-        for option, name, value in (("--airspeed-m-s", "airspeed_m_s", airspeed_m_s), ("--rpm", "rpm", rpm)):
-            if value is not None:  # a recording.toml has no place for it
-                hint = f"Head a column {name}, or give {option} to the command that takes the file"
-                raise InputError(Fault("", option, f"{value:g} with --out", f"no {option}", hint))
         facts = told["unit"], told["column"], told["sign"], pole_pairs, density_kg_m3
-        written = write_recording(table, os.fspath(out), *facts, ignore=left).as_posix()
+        written = write_recording(table, os.fspath(out), *facts, left, rpm, airspeed_m_s).as_posix()
         kept, said = written, {}
         names, told, out, left, insist = [written], dict.fromkeys(told, []), None, [], False
     elif insist and measured and out is None and not (pole_pairs or left):

@@ -89,6 +89,8 @@ class RecordingHead(Table):
     header: bool | None = entry("false: the first line is data; detected if omitted")
     uncertainty_source: str | None = entry("source of the uncertainties")
     ignore: tuple[str, ...] = entry("headings that count for nothing", default=())
+    rpm: float | None = entry("speed of rotation, if no column has it", "rev/min", 1.0, 1e6)
+    airspeed_m_s: float | None = entry("speed of flight, if no column has it", "m/s", 0.0, 400.0)
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -200,7 +202,9 @@ class RecordingToml(Table):
 
     def rules(self) -> Iterable[tuple[str, ...]]:
         """Something that the table does not say itself."""
-        if not (self.recording.ignore or any(p.given() for p in (self.columns, self.rotor, self.air, self.stand))):
+        head = self.recording
+        said = head.ignore or head.rpm is not None or head.airspeed_m_s is not None
+        if not (said or any(p.given() for p in (self.columns, self.rotor, self.air, self.stand))):
             yield "columns", "a table without channels", "a table with one channel or more, [air], [rotor] or [stand]"
 
 
@@ -235,6 +239,12 @@ def joined(made: RecordingToml, folder: Path, file: str) -> Dataset:
     refuse(faults)
     joined = _join(runs, head.files)
     warnings = list(joined.notes)
+    for name in ("rpm", "airspeed_m_s"):
+        own = next((k for k in (name, "J") if k in joined and (k, name) != ("J", "rpm")), None)
+        if (value := getattr(head, name)) is not None and own:
+            warnings.append(f"{name}: ignored, the file has {own}")
+        elif value is not None:
+            joined = replace(joined, values={**joined.values, name: np.full(len(joined), value)})
     air = {"pressure_Pa", "temperature_K"} <= joined.values.keys() or "density_kg_m3" in joined
     if "density_kg_m3" not in constants and not air:
         warnings.append("no air state: coefficients need a density ([air] in the recording)")

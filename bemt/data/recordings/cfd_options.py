@@ -380,12 +380,13 @@ def _read_as(file: str) -> dict[str, str]:
 def write_recording(
     file: str, out: str, unit: Iterable[str] = (), column: Iterable[str] = (), sign: Sequence[str] = (),
     pole_pairs: int | None = None, density_kg_m3: float | None = None, ignore: Sequence[str] = (),
+    rpm: float | None = None, airspeed_m_s: float | None = None,
 ) -> Path:  # fmt: skip
     """Write a recording.toml beside a table of measurements, in the same folder; all faults of the options at once.
 
     `unit` ``NAME=UNIT``, of a quantity or a heading; `column` ``QUANTITY=HEADING``; `sign` ``QUANTITY=-1``;
-    `pole_pairs` of a speed that counts electrical revolutions; density of the air; `ignore` headings. InputError on
-    what is no column, unit or quantity, and where `out` exists.
+    `pole_pairs` of a speed that counts electrical revolutions; density; `ignore` headings; `rpm` and airspeed
+    that no column has. InputError on what is no column, unit or quantity, and where `out` exists.
     """
     import tomlkit
 
@@ -395,7 +396,8 @@ def write_recording(
         faults.append(Fault("", "--out", out, f"a file in the folder of {Path(file).name}", "Both stay together"))
     if path.exists():
         faults.append(Fault(path.as_posix(), "", "a file that exists", "a new name", "Add the lines to it by hand"))
-    document = recording_from(file, unit, column, sign, pole_pairs, density_kg_m3, faults, ignore)
+    document = recording_from(file, unit, column, sign, pole_pairs, density_kg_m3, faults, ignore,
+                              rpm, airspeed_m_s)  # fmt: skip
     inline = {name: tomlkit.inline_table() for name in document["columns"]}
     for name, facts in document["columns"].items():
         inline[name].update(facts)
@@ -407,7 +409,7 @@ def write_recording(
 def recording_from(
     file: str, unit: Iterable[str] = (), column: Iterable[str] = (), sign: Sequence[str] = (),
     pole_pairs: int | None = None, density_kg_m3: float | None = None, faults: Sequence[Fault] = (),
-    ignore: Sequence[str] = (),
+    ignore: Sequence[str] = (), rpm: float | None = None, airspeed_m_s: float | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """Tables of a recording.toml from what options say of a table of measurements; their faults come after `faults`."""
     faults = list(faults)
@@ -429,6 +431,7 @@ def recording_from(
     refuse(faults)
     head: dict[str, Any] = {"file": Path(file).name} | ({"decimal": ","} if decimal_mark(table) == "," else {})
     head |= {"ignore": list(ignore)} if ignore else {}
+    head |= {k: v for k, v in (("rpm", rpm), ("airspeed_m_s", airspeed_m_s)) if v is not None}
     out = Collector(file)
     document = {"recording": head, "columns": columns} | ({"rotor": {"pole_pairs": pole_pairs}} if pole_pairs else {})
     document |= {} if density_kg_m3 is None else {"air": {"density_kg_m3": density_kg_m3}}

@@ -214,6 +214,13 @@ def _command(values: dict[str, Array], names: dict[str, str], notes: list[str]) 
         notes.append(THROTTLE_IS_PULSE)
 
 
+def without_unit(d: Dataset) -> frozenset[str]:
+    """Loads that a series tells by coefficients alone: no unit can be wrong there."""
+    told, loads = d.values.keys(), {"thrust_N": {"thrust_N"}, "torque_Nm": {"torque_Nm", "power_W"}}
+    of = {"thrust_N": {"CT"}, "torque_Nm": {"CP", "CQ"}}
+    return frozenset(k for k in loads if told & of[k] and not told & loads[k])
+
+
 def moves(v: Array) -> bool:
     """Whether a column has more than one value."""
     finite = v[np.isfinite(v)]

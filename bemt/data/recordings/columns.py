@@ -132,7 +132,8 @@ def misread(facts: Facts) -> Iterator[Finding]:
         if v is None or not np.any(np.nan_to_num(v)):
             continue
         size = np.abs(np.nan_to_num(v))
-        rows = np.flatnonzero((np.nan_to_num(rpm) > 0.0) & (size > 0.05 * float(np.median(size[size > 0.0]))))
+        good = (np.nan_to_num(rpm) > 0.0) & ~stuck(name, facts.values)
+        rows = np.flatnonzero(good & (size > 0.05 * float(np.median(size[size > 0.0]))))
         times = lone(rpm[rows], size[rows])
         for i, off in zip(rows[times != 1.0].tolist(), times[times != 1.0].tolist(), strict=True):
             text = (

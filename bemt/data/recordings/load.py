@@ -76,10 +76,11 @@ def import_file(path: str | os.PathLike[str], format: str | None = None, choice:
 
 def _finished(record: Dataset, choice: Choice) -> Dataset:
     """What was read, averaged as asked, as a study of grids where it is one, with a note on means that move."""
-    if choice.period is not None:
+    made = of_table(record) if record.format in ("table", "recording") else record
+    if made is not record:
+        record = made
+    elif choice.period is not None:
         record = averaged(record, choice.period, choice.revolutions)
-    elif record.format in ("table", "recording"):
-        record = of_table(record)
     elif record.clock == "time":
         note = "mean over all rows, including start-up; give --rpm or --period-s for whole revolutions"
         record = replace(record, notes=(*record.notes, note))

@@ -254,6 +254,15 @@ def _jumps(v: Array, w: int) -> tuple[Array, Array]:
     return jump, local
 
 
+def levels(v: Array) -> list[tuple[int, int]]:
+    """Stretches between the steps of samples: first row, and the row behind the last.
+
+    >>> levels(np.repeat([1.0, 2.0, 4.0], 20))
+    [(0, 20), (20, 40), (40, 60)]
+    """
+    return _by_signal(v)[0]
+
+
 def _by_signal(v: Array) -> tuple[list[tuple[int, int]], list[Dropped]]:
     """Stretches between jumps of the medians of neighbouring windows."""
     n, w = len(v), WINDOW

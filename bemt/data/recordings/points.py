@@ -10,7 +10,8 @@ record of samples, or a list of steady points? The rule, in this order:
 4. with time: a median step of 0.2 s or less makes samples; up to 2 s still, when the command is held for five rows or
    more in most rows, or up to 0.5 s when there is no command; anything slower makes points, and so does a command that
    changes from row to row (a slow ramp: quasi-steady);
-5. without time: a command that is held like that makes samples, else points;
+5. without time: a command that is held like that makes samples, and so do stairs: most rows in stretches of 16 or
+   more between two steps, in which nothing goes on changing; else points;
 6. more than 50,000 rows are samples in any case: nobody has so many steady points.
 
 Rest is where nothing turns: the speed reads 0, or no sensor tells and the command is 0 %, and no more current flows
@@ -44,6 +45,8 @@ MOST_POINTS, UNLIKE = 400, 0.02
 LOG = 50_000
 FAST_S, MIDDLE_S, SLOW_S = 0.2, 0.5, 2.0
 HELD = 5
+STEADY = 0.02
+"""Change from the first to the second half of a level, of the largest reading, that a sweep exceeds: declared. [1]"""
 IDLE_S = 1.0005e-3
 TARED = ("thrust_N", "duct_thrust_N", "torque_Nm")
 """Channels of load cells."""
@@ -79,6 +82,28 @@ def _unlike(rec: Dataset) -> bool:
     return bool(steps) and min(steps) > UNLIKE
 
 
+def _middle(v: Array) -> float:
+    """Median of what is finite; NaN of nothing."""
+    good = v[np.isfinite(v)]
+    return float(np.median(good)) if good.size else math.nan
+
+
+def _stairs(rec: Dataset) -> bool:
+    """Whether most rows stand on levels, each as long as what shows a step, on which no load goes on changing.
+
+    Of 1,793 published files without clock or command none is such a table of points.
+    """
+    told = [v for s in SIGNALS if (v := rec.values.get(s)) is not None and moves(v)]
+    rows = np.flatnonzero(np.isfinite(told[0])) if told else np.empty(0, dtype=np.intp)
+    if rows.size < 2 * plateaus.WINDOW:
+        return False
+    long = [rows[a:b] for a, b in plateaus.levels(told[0][rows]) if b - a >= 2 * plateaus.WINDOW]
+    if len(long) < 2 or sum(map(len, long)) < 0.5 * rows.size:
+        return False
+    halves = [[np.diff([_middle(v[half]) for half in np.array_split(on, 2)])[0] for on in long] for v in told]
+    return all(not np.nanmedian(np.abs(h)) > STEADY * np.nanmax(np.abs(v)) for h, v in zip(halves, told, strict=True))
+
+
 def is_samples(rec: Dataset) -> tuple[bool, str]:
     """Decide what the rows are."""
     if stated(rec):
@@ -104,6 +129,8 @@ def is_samples(rec: Dataset) -> tuple[bool, str]:
         return False, f"rows are points: {words}{more}" + (" (a slow ramp: quasi-steady)" if step <= MIDDLE_S else "")
     if held:
         return True, "rows are samples: no time, but the command is held over many rows"
+    if t is None and found is None and _stairs(rec):
+        return True, "rows are samples: no time, but they stand in stairs"
     if len(rec) > LOG:
         return True, f"rows are samples: more than {LOG}"
     return False, "rows are points: no time, and no command that is held"

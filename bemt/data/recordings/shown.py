@@ -243,7 +243,7 @@ class Imported:
             steps = "\n".join(f"  ! {line}" for line in self.to_do.splitlines())
             lines.append(f"To use it as a CFD run, and --out run.toml to keep it:\n{steps}\n")
         if wrote or self.runs:
-            return "\n".join([*lines, self._next_with_a_run(wrote, {"case": said.get("case", ["CASE"])})])
+            return "\n".join([*lines, self._next_with_a_run(wrote, said or {"case": ["CASE"]})])
         return "\n".join([*lines, *self._next_with_recordings(said or {"case": ["CASE"]})])
 
     def _next_with_a_run(self, wrote: str, said: Mapping[str, Sequence[str | float]]) -> str:
@@ -253,6 +253,7 @@ class Imported:
         usable = usable or any(f.path == name and f.format == RUN for f in self.files)
         file = wrote or (name if usable else "study.toml" if self.runs[0].studies else "run.toml")
         lead = f"{wrote} written. " if wrote else "" if file == name else f"With --out {file}: "
+        said = said if file == name else {"case": said["case"]}
         return f"{lead}Next: bemt compare {' '.join([shlex.quote(file), *options_of(said)])}{_a_case(said)}\n"
 
     def _next_with_recordings(self, said: Mapping[str, Sequence[str | float]]) -> list[str]:

@@ -26,7 +26,7 @@ from bemt.base.tables import number_of, number_text, speed_text, text_table
 from bemt.data.recordings.audit import AuditLine, combined
 from bemt.data.recordings.cfd_run import is_run, run_at
 from bemt.data.recordings.cfd_setup import Elsewhere, audit_of, conditions_of, faults_first, floor_note, grid_floor
-from bemt.data.recordings.channels import named
+from bemt.data.recordings.channels import named, without_unit
 from bemt.physics.dataset import Dataset
 from bemt.rotors.as_measured import FACTOR
 from bemt.rotors.case import Case
@@ -200,7 +200,8 @@ def compare_run(
         tuple(dict.fromkeys(notes)),
         _sentence(out, "CFD" if computed else "Recording", open_units(imported),
                   imported.elsewhere if is_run(imported) else (),
-                  "density_kg_m3" not in points_stated and not points_stated.isdisjoint(_KIND)),
+                  "density_kg_m3" not in points_stated and not points_stated.isdisjoint(_KIND),
+                  without_unit(points)),
         _next(out, lines, name, asked, whole.moved),
     )  # fmt: skip
 
@@ -268,8 +269,13 @@ def _share(load: BothLoads) -> float:
     return math.hypot(np.nan_to_num(load.u_cfd, posinf=0.0) / load.cfd, load.u_bemt / load.bemt, 0.02)
 
 
-def _slip(name: str, loads: Sequence[BothLoads], unit_open: bool, density_open: bool = False) -> tuple[float, str]:
-    """What a difference looks like that is no physics, and how little it fits; "" when nothing is near."""
+def _slip(
+    name: str, loads: Sequence[BothLoads], unit_open: bool | None, density_open: bool = False
+) -> tuple[float, str]:
+    """What a difference looks like that is no physics, and how little it fits; "" when nothing is near.
+
+    ``unit_open``: whether the unit is not stated; None of a coefficient, which has none.
+    """
     said = [load for load in loads if load.cfd and load.bemt and math.isfinite(load.u_both)]
     if not said:
         return math.inf, ""
@@ -280,7 +286,8 @@ def _slip(name: str, loads: Sequence[BothLoads], unit_open: bool, density_open: 
         return math.inf, ""
     wide = np.array([_share(load) for load in said])
     # no rotor of the case is off by FACTOR: then even a unit that is stated may be wrong
-    may = (e for e in unit_errors.errors(_KIND[name]) if unit_open or max(e.factor, e.repair) > FACTOR)
+    errors = () if unit_open is None else unit_errors.errors(_KIND[name])
+    may = (e for e in errors if unit_open or max(e.factor, e.repair) > FACTOR)
     near = [(e.rarity + float(np.mean(far**2)), e) for e in may
             if np.all((far := np.abs(np.log(off / e.factor)) / wide) < 1.0)]  # fmt: skip
     if not near:
@@ -316,7 +323,7 @@ def _not_counted(channel: str, loads: Sequence[BothLoads], elsewhere: Sequence[E
 
 def _sentence(
     points: Sequence[PointOfRun], who: str, units_open: Collection[str] = (), elsewhere: Sequence[Elsewhere] = (),
-    density_open: bool = False,
+    density_open: bool = False, unitless: Collection[str] = (),
 ) -> str:  # fmt: skip
     every = [(k, load) for p in points for k, load in p.loads.items()]
     off = [(k, load) for k, load in every if load.verdict == "differs"]
@@ -334,7 +341,8 @@ def _sentence(
         elif fluid:
             tail += fluid
         else:
-            slips = [_slip(name, own, name in units_open, density_open) for name, own in loads.items()]
+            slips = [_slip(name, own, None if name in unitless else name in units_open, density_open)
+                     for name, own in loads.items()]  # fmt: skip
             said = [slip for slip in slips if slip[1]]  # a unit explains all that differs, or nothing
             tail += min(said, key=lambda slip: (math.isfinite(slip[0]), slip[0]))[1] if said else ""
         share = f" in {len(off)} of {len(every)} values" if len(every) > 1 else ""

@@ -249,6 +249,7 @@ def _record(
         points.name, rpm, V, air_of_points(fields), measured, u, extra, {}, zero, recorded,
         reference=reference, repeatability=repeatability,
         electrical=channels.get("torque_Nm") == "electrical_power_W",
+        unitless=frozenset(k for k, c in channels.items() if c in ("CT", "CP", "CQ")),
     )  # fmt: skip
     return record.take(np.flatnonzero(good))
 

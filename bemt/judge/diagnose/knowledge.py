@@ -13,7 +13,7 @@ import os
 import shlex
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -134,12 +134,18 @@ _LOADS = {"thrust_N": "thrust", "torque_Nm": "torque"}
 
 
 def possible(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
-    """Candidates without what cannot be: what nobody read has no wrong unit and no cell."""
+    """Candidates without what cannot be: what nobody read has no wrong unit and no cell, a coefficient no unit."""
     tested = [p.record for p in problem.parts if not p.record.reference]
     unread = set() if any(r.air_recorded for r in tested) else {"density_kg_m3"}
     unread |= {"torque_Nm"} if any(r.electrical for r in tested) else set()
+    bare = frozenset[str]().union(*(r.unitless for r in tested))
     able = (c for c in candidates if effects.catalogue()[c.id].sensor not in unread)
-    kept = (c.only(np.array([s.get("channel") not in unread for s in c.settings])) for c in able)
+
+    def read(setting: Mapping[str, Any]) -> bool:  # a sign needs no unit
+        of = setting.get("channel")
+        return of not in unread and (of not in bare or setting.get("factor", -1.0) < 0.0)
+
+    kept = (c.only(np.array([read(s) for s in c.settings])) for c in able)
     return tuple(_repaired(problem, c) for c in kept if c is not None)
 
 

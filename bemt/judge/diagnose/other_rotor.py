@@ -273,7 +273,7 @@ def _slips(problem: Problem, found: dict[str, float]) -> Iterator[_Slip]:
     for error in unit_errors.errors("rotation"):
         yield "speed", f"rpm: {error.words}", dict.fromkeys(found, -2.0 * math.log(error.factor)), 1.0 + error.rarity
     for channel, kind in ((T, "force"), (Q, "torque")):
-        errors = unit_errors.errors(kind) if channel in found else ()
+        errors = unit_errors.errors(kind) if channel in found.keys() - part.record.unitless else ()
         # what a figure of merit or a coefficient tells already
         told = [e for e in errors if any(f"{channel}: {e.words}" in f for f in part.record.findings)]
         for error in told or errors:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.units import ZERO_CELSIUS
+from bemt.data.recordings.channels import without_unit
 from bemt.judge.diagnose.repeats import conditions, fell, spread_sizes
 from bemt.physics.air import Air
 from bemt.physics.effects.base import follows
@@ -79,6 +80,7 @@ class Record:
     top_rpm: float = np.inf  # Fastest that the stand may run [rev/min]
     computed: bool = False  # Whether the points are those of CFD
     declared: Mapping[str, float] = field(default_factory=dict)  # Unit of the heading, by channel [its own unit]
+    unitless: frozenset[str] = frozenset()  # Loads that are known by their coefficients alone
 
     def __len__(self) -> int:
         """Give the number of points."""
@@ -158,7 +160,8 @@ def from_series(series: Dataset, case: Case, correlated: Mapping[str, Mapping[st
             raise InputError(Fault(series.name, "rpm", no_speed, "a speed above 0", "Turn its sign in the file"))
         raise InputError(Fault(series.name, "", "no point with a speed and a load", "one or more"))
     gain, zero = ({k: float(v[of]) for k, v in (correlated or {}).items() if v.get(of)} for of in ("gain", "zero"))
-    record = Record(series.name, rpm, V, air, measured, u, extra, gain, zero, recorded, tuple(notes))
+    record = Record(series.name, rpm, V, air, measured, u, extra, gain, zero, recorded, tuple(notes),
+                    unitless=without_unit(series))  # fmt: skip
     return thinned(record.take(np.flatnonzero(keep)))
 
 
@@ -384,6 +387,7 @@ def merged(records: Sequence[Record]) -> Record:
         repeatability=float(np.fmax.reduce([r.repeatability for r in records])), electrical=False,
         top_rpm=min(r.top_rpm for r in records), computed=all(r.computed for r in records),
         declared={k: v for k, v in whole.declared.items() if all(r.declared.get(k) == v for r in records)},
+        unitless=frozenset.union(*(r.unitless for r in records)),
     ))  # fmt: skip
 
 

@@ -43,18 +43,16 @@ def _pages(book: Book) -> Iterator[Page]:
 def book_html(book: Book) -> str:
     """Write the HTML of a report."""
     from bemt.base.page import render
-    from bemt.results.report.diagnosis_block import headline
+    from bemt.results.report.front import heading
 
-    about, only = book.about, book.cases
-    made = " · ".join(filter(None, (about.author, about.date, about.revision)))
+    title, made = heading(book)
     lead = "Propellers and ducted fans: blade element momentum theory, the K1/K2 formula, CFD, bench and vendor data."
-    if not any(case.result.no_check for case in only):
+    if not any(case.result.no_check for case in book.cases):
         lead += " Nothing here is fitted to the value it is compared with."
     foot = (
         f"Made by bemt {book.version}. Thrust in newtons, CT = T/(ρ n² D⁴), CP = P/(ρ n³ D⁵). "
         "Colours after Okabe and Ito. This file loads nothing from the network."
     )
-    title = about.title or (headline(only[0].result) if len(only) == 1 else "Validation report")
     return render(
         "bemt.results.report", "report.html", ["page.js", "plot.js", "rotor.js"], pages=list(_pages(book)), foot=foot,
         title=title, lead=f"{made}. {lead}" if made else lead,

@@ -46,6 +46,8 @@ OF_TABLE = (
     "that; first value of each source. Click a heading to sort."
 )
 
+NO_NUMBER = "No case has a thrust, neither solved nor recorded: its page says what it lacks."
+
 
 def answers(book: Book, ids: Sequence[str]) -> list[ShownAnswer]:
     """Give one sentence per case."""
@@ -106,6 +108,8 @@ def _comparison_table(book: Book, ids: Sequence[str]) -> PageTable | None:
             *(num(v.get(source, (None,))[0]) for source in ("openfoam", "bench", "vendor")),
             *(num(x, signed=True) for x in off), Cell(word, badge=kind),
         ])  # fmt: skip
+    if all(row[k].value is None for row in rows for k in (3, *range(6, 11))):
+        return None
     used = [k for k in range(len(COLUMNS)) if k < 4 or any(not r[k].number or r[k].value is not None for r in rows)]
     return table([COLUMNS[k] for k in used], [[r[k] for k in used] for r in rows])
 
@@ -115,9 +119,10 @@ def front_parts(book: Book, ids: Sequence[str]) -> list[Part]:
     plot = _comparison_plot(book)
     badges = [page_verdict(page)[1] for page in book.cases]
     told = [text for lead, text in NEEDS.items() if any(badge.startswith(lead) for badge in badges)]
+    numbers = _comparison_table(book, ids)
     return [
-        ("words", " ".join(told) if plot else ""), ("figures", [plot] if plot else []), ("words", OF_TABLE),
-        ("table", _comparison_table(book, ids)),
+        ("words", " ".join(told) if plot else ""), ("figures", [plot] if plot else []),
+        ("words", OF_TABLE if numbers else NO_NUMBER), ("table", numbers),
     ]  # fmt: skip
 
 
@@ -139,25 +144,36 @@ def _n(value: Any, digits: int = 4) -> str:
     return number_text(float(value), digits) if good else "-"
 
 
-def summary(book: Book) -> str:
-    """Write the summary."""
-    out = [
-        "# Validation report",
-        "",
-        f"Made by bemt {plain_markdown(book.version)}. Figures and tables: `report.html`.",
-        "",
-    ]
-    out += [
-        "| case | BEMT T [N] | u [N] | K1/K2 T [N] | CFD T [N] | bench T [N] | vendor T [N] | rev/min | verdict |",
-        "|---|---|---|---|---|---|---|---|---|",
-    ]
+def heading(book: Book) -> tuple[str, str]:
+    """Title, and who made the report when and of what."""
+    about, names = book.about, [headline(page.result) for page in book.cases]
+    made = " · ".join(filter(None, (about.author, about.date, about.revision)))
+    return about.title or (names[0] if len(names) == 1 else "Validation report"), made
+
+
+def _numbers(book: Book) -> list[str]:
+    """Table of all cases, its columns those that hold a number; a sentence where none does."""
+    rows = []
     for page in book.cases:
-        r = page.result
-        own, v = lead(r), {source: items[0][1] for source, items in _values(page).items()}
+        own, v = lead(page.result), {source: items[0][1] for source, items in _values(page).items()}
         others = [_n(v.get(source)) for source in ("k1k2", "cfd", "bench", "vendor")]
         cells = [_n(own and own.thrust_N), _n(own and own.u, 2), *others, _n(own and own.rpm, 6)]
-        words = [plain_markdown(r.name, 80), *cells, plain_markdown(page_verdict(page)[1])]
-        out.append(f"| {' | '.join(words)} |")
+        rows.append([plain_markdown(page.result.name, 80), *cells, plain_markdown(page_verdict(page)[1])])
+    heads = ["case", "BEMT T [N]", "u [N]", "K1/K2 T [N]", *(f"{k} T [N]" for k in ("CFD", "bench", "vendor")),
+             "rev/min", "verdict"]  # fmt: skip
+    last = len(heads) - 1
+    used = [k for k in range(last + 1) if k in (0, last) or any(row[k] != "-" for row in rows)]
+    if not any(0 < k < last - 1 for k in used):
+        return [NO_NUMBER]
+    lines = [[row[k] for k in used] for row in (heads, ["---"] * len(heads), *rows)]
+    return [f"| {' | '.join(line)} |" for line in lines]
+
+
+def summary(book: Book) -> str:
+    """Write the summary."""
+    title, made = (plain_markdown(words, 300) for words in heading(book))
+    by = f"Made by bemt {plain_markdown(book.version)}. Figures and tables: `report.html`."
+    out = [f"# {title}", "", f"{made}. {by}" if made else by, "", *_numbers(book)]
     for page in book.cases:
         r = page.result
         out += ["", f"## {plain_markdown(headline(r), 140)}", "", plain_markdown(page_verdict(page)[2], 1500)]
