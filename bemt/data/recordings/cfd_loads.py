@@ -85,6 +85,12 @@ class LoadColumn:
         return word.removesuffix(f"_{self.unit}") if self.unit else word
 
     @property
+    def of_reference(self) -> bool:
+        """Whether the heading is a coefficient of which only the user knows the reference: ``ct``, ``cd-1``."""
+        bare = re.fullmatch(r"c[a-z]?[a-z]([-_]\w*)?|.*coeff.*", self.words, re.IGNORECASE)
+        return bool(bare) and self.unit in ("", "-") and not self.coefficient[0]
+
+    @property
     def coefficient(self) -> tuple[str, float]:
         """Coefficient of a propeller that the heading names, or its advance ratio, and the factor on the values."""
         word = re.sub(r" \d$", "", self.words)  # STAR-CCM+ numbers its reports
@@ -193,8 +199,8 @@ class OpenRun:
             got = f"{told}, where the file says {c.unit}"
             self.fault(c, c.name, got, "the unit of the file", f"Leave out --unit {quantity}={told!r}")
             return None
-        if not c.unit and not told and (c.of_sound or (c.part and c.axis)):
-            factor = self._of_sound(c) if c.of_sound else self._reference(c)
+        if not c.unit and not told and (c.of_sound or (c.part and c.axis) or (c.of_reference and quantity in _VECTOR)):
+            factor = self._of_sound(c) if c.of_sound else self._reference(c, c.part or _VECTOR.get(quantity, ""))
             return None if factor is None else c.record[c.name] * factor
         if unit is None:
             usual = QUANTITIES[quantity][1]
@@ -224,16 +230,16 @@ class OpenRun:
         self.rested |= {"density_kg_m3", "sound_m_s", "length_m"}
         return rho * a**2 * unit**2 * {"force": 1.0, "moment": unit}.get(c.part, a)
 
-    def _reference(self, c: LoadColumn) -> float | None:
-        """Newtons, or newton metres, for one of a coefficient."""
+    def _reference(self, c: LoadColumn, part: str) -> float | None:
+        """Newtons, or newton metres, for one of a coefficient; a propeller's own has n D, 2 D^2 and D for reference."""
         ref, head = self.run.reference, self.run.run
         rho = ref.density_kg_m3 or head.density_kg_m3
         force = float(c.record["RefForce"][-1]) if "RefForce" in c.record else math.nan
         if math.isnan(force) and rho and ref.area_m2 and ref.speed_m_s:
             force = 0.5 * rho * ref.speed_m_s**2 * ref.area_m2
             self.rested |= {"density_kg_m3", "speed_m_s", "area_m2"}
-        length = 1.0 if c.part == "force" else ref.length_m
-        self.rested |= set() if c.part == "force" else {"length_m"}
+        length = 1.0 if part == "force" else ref.length_m
+        self.rested |= set() if part == "force" else {"length_m"}
         if math.isnan(force) or length is None:
             hint = "--reference area=A,length=L,speed=V,density=RHO in m2, m, m/s, kg/m3, as set in the solver"
             self.fault(c, c.name, "a coefficient", "the reference values it rests on", hint)
@@ -293,7 +299,7 @@ class OpenRun:
             self.fault(None, "density", got, "the density of the run", "--density-kg-m3 RHO: loads go with it")
             return np.ones(1)
         self.notes.append(f"loads times {_middle(rho) / taken:.4g}: the program took a density of {taken:g} kg/m3")
-        return rho / taken
+        return np.asarray(rho / taken)
 
     def mean(self, quantity: str, c: LoadColumn) -> Settled | None:
         """Settled value of one column."""

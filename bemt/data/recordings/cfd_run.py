@@ -236,6 +236,9 @@ def _nothing(work: OpenRun) -> None:
         return work.fault(None, "", f"{what} ({known})", NO_LOAD, EXPORT)
     first = next((c.name for c in work.columns if not c.unit and not heading(c.words).unit), "NAME")
     hint = f'Say which it is by its unit: --unit "{first}=N" for a thrust, "{first}=N m" for a torque'
+    if rest := list(dict.fromkeys(c.words for c in work.columns if c.of_reference)):
+        hint = f"Coefficients: --column thrust={rest[0]}{f' torque={rest[1]}' if len(rest) > 1 else ''} --reference "
+        hint += "area=A,length=L,speed=V,density=RHO of the solver; of T/(rho n^2 D^4) they are 2 D^2, D and n D"
     work.fault(None, "", f"columns {known}", NO_LOAD, hint)
 
 
@@ -379,7 +382,7 @@ def _conditions(
 
 
 def _stated_grid(work: OpenRun) -> dict[str, float]:
-    """Standard uncertainty by the grid as the user states it, by channel [1]: of one load, it says nothing of others."""
+    """Standard uncertainty by the grid as stated, by channel [1]: of one load it says nothing of the other."""
     told = work.run.setup
     own = ((THRUSTS, told.gci_pct), (TORQUES, told.gci_torque_pct))
     return {k: 0.01 * gci / COVERAGE for channels, gci in own if gci is not None for k in channels}
