@@ -742,3 +742,87 @@ def test_bands_that_hide_a_difference_name_what_would_narrow_them() -> None:
     assert "chord" in told and f"{np.sqrt(1.0 + 0.04 - 0.81):.2g}" in told
     assert not one_run._narrower(_points([1.5]), moved)
     assert not one_run._narrower(_points([1.01], 0.1), moved)  # the band of the run is the wider
+
+
+FAN = {"rotor_blades": (45.6, -1.15), "spinner": (-1.05, -0.001), "stator_vanes": (-2.2, 1.01),
+       "duct_inner": (21.9, 0.01), "duct_lip": (4.9, 0.0), "motor_pod": (-0.6, 0.001)}  # fmt: skip
+"""Force and moment of each zone of a ducted fan with vanes [N], [N m]."""
+
+
+def zones_report(put: Callable[..., Path], zones: dict[str, tuple[float, float]]) -> list[str]:
+    for k, (name, kind, unit) in enumerate((("forces", "Forces", "N"), ("moments", "Moments", "N m"))):
+        way = "Direction Vector (0 0 1)" if k == 0 else "Moment Center (0 0 0) Moment Axis (0 0 1)"
+        rows = [(z, v[k]) for z, v in zones.items()]
+        body = "".join(f"{z:16} {0.9 * v:.6g}  {0.1 * v:.6g}  {v:.6g}\n" for z, v in rows)
+        net = sum(v for _, v in rows)
+        put(f"{name}.txt", f"{kind} - {way}\n          {kind} [{unit}]\nZone      Pressure   Viscous   Total\n{body}"
+            f"------ ------ ------ ------\nNet  {0.9 * net:.6g} {0.1 * net:.6g} {net:.6g}\n")  # fmt: skip
+    return ["forces.txt", "moments.txt"]
+
+
+@pytest.mark.parametrize("names", [{}, {"stator_vanes": "ogv"}, {"stator_vanes": "wall-5"}])
+def test_the_torque_is_that_of_what_turns_and_the_thrust_that_of_all(
+    put: Callable[..., Path], names: dict[str, str]
+) -> None:
+    files = zones_report(put, {names.get(z, z): v for z, v in FAN.items()})
+    run = run_of(files, {"rpm": 29000.0})
+    assert run["torque_Nm"][0] == pytest.approx(1.151)
+    assert run["thrust_N"][0] == pytest.approx(sum(T for T, _ in FAN.values()))
+    assert run["duct_thrust_N"][0] == pytest.approx(26.8)
+    assert any(names.get("stator_vanes", "stator_vanes") in n for n in run.notes if "torque" in n)
+
+
+def test_zones_of_which_nothing_tells_what_turns_are_asked_for(put: Callable[..., Path]) -> None:
+    files = zones_report(put, {f"wall-{k}": v for k, v in enumerate(FAN.values())})
+    with pytest.raises(InputError, match="--rotor-zones wall-0"):
+        run_of(files, {"rpm": 29000.0})
+    run = run_of(files, {"rpm": 29000.0, "rotor_zones": ("wall-0", "wall-1")})
+    assert run["torque_Nm"][0] == pytest.approx(1.151)
+    files = zones_report(put, {"blade_upper": (5.0, -0.1), "blade_lower": (4.0, 0.09)})  # two shafts
+    with pytest.raises(InputError, match="--rotor-zones"):
+        run_of(files, {"rpm": 6000.0})
+    files = zones_report(put, {"wall-1": (5.0, -0.1), "wall-2": (0.1, -0.002)})  # all turn one way
+    assert run_of(files, {"rpm": 6000.0})["torque_Nm"][0] == pytest.approx(0.102)
+
+
+def test_forces_of_another_density_are_made_those_of_the_run(put: Callable[..., Path]) -> None:
+    files = [f"postProcessing/forces/0/{name}.dat" for name in ("force", "moment")]
+    foam(put)
+    plain = run_of(files, {"rpm": RPM})
+    assert any("--reference density" in n for n in plain.notes)
+    told = run_of(files, {"rpm": RPM, "density_kg_m3": 1.2}, reference={"density_kg_m3": 1.0})
+    for channel in ("thrust_N", "torque_Nm"):
+        assert told[channel][0] == pytest.approx(1.2 * plain[channel][0])
+        assert told.u[channel][0] == pytest.approx(1.2 * plain.u[channel][0])
+    assert not any("--reference density" in n for n in told.notes)
+    with pytest.raises(InputError, match="--density-kg-m3"):
+        run_of(files, {"rpm": RPM}, reference={"density_kg_m3": 1.0})
+    with pytest.raises(InputError, match="no load here rests on it"):  # what is stated has an effect, or is refused
+        run_of(files, {"rpm": RPM}, reference={"area_m2": 1.0})
+
+
+def test_a_rotor_that_brakes_in_flight_is_not_turned_into_one_that_pulls(put: Callable[..., Path]) -> None:
+    put("thrust.out", rfile("thrust", steady(-1.2), None))
+    put("torque.out", rfile("torque", steady(-0.006), None))
+    flight = {"rpm": 6000.0, "airspeed_m_s": 20.0}  # a pull would be 24 W of a shaft of 3.8 W
+    with pytest.raises(InputError, match="--sign torque=1 keeps it"):
+        run_of(["thrust.out", "torque.out"], flight, **UNITS)
+    driven = {"columns": {"thrust": {"unit": "N"}, "torque": {"unit": "N m", "sign": 1}}}
+    run = run_of(["thrust.out", "torque.out"], flight, **driven)
+    assert run["thrust_N"][0] == pytest.approx(-1.2, rel=1e-3) and not any("merit" in n for n in run.notes)
+    with pytest.raises(InputError, match="--sign thrust=1 keeps it"):  # 2.4 W of 3.8 W: either may be
+        run_of(["thrust.out", "torque.out"], {"rpm": 6000.0, "airspeed_m_s": 2.0}, **UNITS)
+    put("thrust.out", rfile("thrust", steady(1.2), None))  # a pull takes power of the shaft
+    run = run_of(["thrust.out", "torque.out"], {"rpm": 6000.0, "airspeed_m_s": 2.0}, **UNITS)
+    assert run["torque_Nm"][0] == pytest.approx(0.006, rel=1e-3)
+
+
+def test_coefficients_of_a_solver_are_loads_by_its_reference_values(put: Callable[..., Path]) -> None:
+    put("ct.out", rfile("ct", steady(T / FORCE), None))
+    put("cq.out", rfile("cq", steady(Q / FORCE / LENGTH), None))
+    with pytest.raises(InputError, match="--reference area=A"):
+        run_of(["ct.out", "cq.out"], {"rpm": RPM})
+    columns = {"thrust": {"column": "ct"}, "torque": {"column": "cq"}}
+    told = {"area_m2": AREA, "length_m": LENGTH, "speed_m_s": SPEED, "density_kg_m3": RHO}
+    run = run_of(["ct.out", "cq.out"], {"rpm": RPM}, columns=columns, reference=told)
+    assert (run["thrust_N"][0], run["torque_Nm"][0]) == pytest.approx((T, Q), rel=1e-4)

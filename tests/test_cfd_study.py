@@ -488,3 +488,20 @@ def test_a_column_can_be_left_out(tmp_path: Path) -> None:
     )
     kept = import_file(tmp_path / "recording.toml")
     assert kept["thrust_N"] == pytest.approx([7.0, 8.0, 9.0]) and set(kept.values) == {"rpm", "thrust_N"}
+
+
+def test_a_grid_index_of_one_load_says_nothing_of_the_other(tmp_path: Path) -> None:
+    options = {"rpm": 6000.0, "unit": ["thrust=N", "torque=N m"]}
+    one = histories(tmp_path)[0]
+    thrust = assemble(run_from([one], **options, setup=["gci_pct=1.15"]))
+    both = assemble(run_from([one], **options, setup=["gci_pct=1.15", "gci_torque_pct=2.3"]))
+    for run, torque in ((thrust, grid_floor("torque_Nm", False)), (both, 0.02)):
+        assert run.u["thrust_N"][0] / run["thrust_N"][0] == pytest.approx(0.01, rel=0.01)
+        assert run.u["torque_Nm"][0] / run["torque_Nm"][0] == pytest.approx(torque, rel=0.01)
+
+
+def test_grids_that_nobody_told_apart_are_asked_for_first(tmp_path: Path) -> None:
+    with pytest.raises(InputError) as caught:
+        assemble(run_from(histories(tmp_path), rpm=6000.0, unit=["thrust=N", "torque=N m"]))
+    (fault,) = caught.value.faults
+    assert "clock" not in fault.got and fault.hint.startswith("One condition on several grids: --setup cells=")

@@ -182,3 +182,28 @@ def test_slices_are_compared_at_the_speed_of_the_recording(tmp_path: Path) -> No
     run.write_text("rpm,airspeed_m_s,thrust_N,torque_Nm\n" + "".join(f"{n},0,5,0.1\n" for n in (5000, 6000, 7000)))
     with pytest.raises(InputError, match="slices without a speed, and 3 readings at 5000 to 7000 rev/min"):
         bemt.diagnose(run, case, along=path)
+
+
+@pytest.mark.parametrize("angle", ["alpha_deg", "Alpha (deg)"])
+@pytest.mark.parametrize("loads", ['"Thrust per unit span (N/m)","Torque per unit span (N)"',
+                                   '"Thrust per Length (N/m)","Torque per Length (N-m/m)"'])  # fmt: skip
+def test_a_table_of_slices_is_known_as_one(tmp_path: Path, angle: str, loads: str) -> None:
+    from bemt.data.recordings.load import import_file
+
+    rows = "".join(f"{x},{0.1 * x},0.02,{8 - 4 * x},1.1,0.03,0.1,{100 * x},{2 * x}\n" for x in (0.2, 0.6, 1.0))
+    head = f'"r/R","Radius (m)","Chord (m)","{angle}","Cl","Cd","Mach",{loads}'
+    (tmp_path / "slices.csv").write_text(f"{head}\n{rows}")
+    found = import_file(tmp_path / "slices.csv")
+    assert found.format == "slices" and any(n.startswith("slices: 4.8 N and 0.096 N m") for n in found.notes)
+    (read,) = read_blade_loads(tmp_path / "slices.csv").values()
+    assert read.thrust.tolist() == [20.0, 60.0, 100.0] and read.torque.tolist() == [0.4, 1.2, 2.0]
+
+
+def test_slices_without_loads_per_radius_are_no_polar(tmp_path: Path) -> None:
+    from bemt.base.errors import InputError
+    from bemt.data.recordings.load import import_file
+
+    (tmp_path / "s.csv").write_text("r_m,chord_m,alpha_deg,cl,cd,Fz_N\n0.02,0.02,6,0.7,0.02,0.1\n")
+    with pytest.raises(InputError) as caught:
+        import_file(tmp_path / "s.csv")
+    assert len(caught.value.faults) == 1 and "thrust_per_radius" in str(caught.value)

@@ -477,6 +477,11 @@ def test_a_prescribed_load_integrates_to_the_loads(word: str, job: Job, fan: Job
         assert stated["thrust"] < 1e-4 and stated["torque"] < 1e-4
 
 
+def test_a_disk_of_su2_says_where_its_thrust_and_its_stream_point(job: Job) -> None:
+    files = [str(data) for data in written("su2-disk", Job(job.case, airspeed_m_s=10.0)).values()]
+    assert len(files) == 2 and all("thrust on the rotor along -x" in f and "wake along +x" in f for f in files)
+
+
 def test_rotor_disk_by_its_own_formula_at_rest_and_in_flight(job: Job) -> None:
     """f = q c B A/(2 pi r), force (0, -f Cd, f Cl), from the written text."""
     for V in (0.0, 8.0):

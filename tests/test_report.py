@@ -843,3 +843,18 @@ def test_no_page_is_wider_than_the_window(opened: Browser, width: int) -> None:
     for page, size in opened.run(wide):
         assert size <= width, page
     assert opened.complaints == []
+
+
+def test_runs_of_cfd_beside_a_case_stand_beside_the_model_at_their_own_speed(tmp_path: Path) -> None:
+    case = write_case(tmp_path / "cases", "plain", "A plain propeller", "")
+    (case / "references.csv").unlink()
+    (case / "case.toml").write_text((case / "case.toml").read_text().replace('references = "references.csv"\n', ""))
+    rows = "".join(f"{k},2.1\n" for k in range(99))
+    (tmp_path / "cfd.csv").write_text('"Iteration","Thrust Monitor: Thrust (N)"\n' + rows)
+    (tmp_path / "run.toml").write_text('[run]\nfiles = ["cfd.csv"]\nrpm = 4000.0\nairspeed_m_s = 0.0\n')
+    book = gather([case], tmp_path / "out", recordings=[str(tmp_path / "run.toml")])
+    at = {row.source: row.thrust_N for row in book.cases[0].result.rows if row.rpm == 4000.0}
+    assert at["cfd"] == pytest.approx(2.1) and at["bemt"] > 1.0
+    (line,) = (line for line in summary(book).splitlines() if line.startswith("| plain |"))
+    assert "2.100" in line and "4000" in line
+    assert "2.100" in book_html(book)

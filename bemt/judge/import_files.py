@@ -28,7 +28,8 @@ def import_(
     pole_pairs: Count | None = None, case: Propeller | File | None = None,
     picture: File | None = None, unit: Mapping[str, str] = {}, column: Mapping[str, str] = {},  # noqa: B006
     sign: Mapping[str, str] = {}, sector: Count | None = None, zones: Sequence[str] = (),  # noqa: B006
-    axis: Literal["x", "y", "z"] | None = None, airspeed_m_s: float | None = None, density_kg_m3: float | None = None,
+    rotor_zones: Sequence[str] = (), axis: Literal["x", "y", "z"] | None = None,
+    airspeed_m_s: float | None = None, density_kg_m3: float | None = None,
     reference: Mapping[str, str] = {}, setup: Mapping[str, str] = {}, ignore: Sequence[str] = (),  # noqa: B006
     out: File | None = None,
 ) -> Told:  # fmt: skip
@@ -64,6 +65,8 @@ def import_(
         The model is one of so many equal sectors: loads are multiplied.
     zones : sequence of str
         Zones whose loads count: blade,hub,duct.
+    rotor_zones : sequence of str
+        Those of them on the shaft, where neither names nor moments tell: blade,hub.
     axis : {"x", "y", "z"}, optional
         Axis of the shaft; that of the largest force by default.
     airspeed_m_s : float, optional
@@ -71,9 +74,11 @@ def import_(
     density_kg_m3 : float, optional
         Density of the fluid. [kg/m3]
     reference : mapping
-        What coefficients rest on: area=A length=L speed=V density=RHO sound=A. [m2, m, m/s, kg/m3, m/s]
+        What coefficients rest on: area=A length=L speed=V density=RHO sound=A, in m2, m, m/s, kg/m3. Forces are
+        multiplied by the density of the run over that one: OpenFOAM's of rhoInf 1 with density=1.
     setup : mapping
-        How it was computed: cells=2.1e6 grid_level=fine turbulence='k-omega SST' solver=pressure steady=no gci_pct=2;
+        How it was computed: cells=2.1e6 grid_level=fine turbulence='k-omega SST' solver=pressure steady=no gci_pct=2
+        (of the thrust; gci_torque_pct of the torque);
         cells=0.5e6,1.7e6,5.8e6 makes a grid study of three folders, or of three files of each kind.
     ignore : sequence of str
         Headings of columns that count for nothing.
@@ -114,8 +119,9 @@ def import_(
     choice = asked(rpm, period_s, revolutions)
     load.check_format(format)
     told: dict[str, list[str]] = {"unit": words(unit), "column": words(column), "sign": words(sign)}
-    run: dict[str, Any] = {"sector": sector, "zones": list(zones), "axis": axis, "airspeed_m_s": airspeed_m_s,
-           "density_kg_m3": density_kg_m3, "reference": words(reference), "setup": words(setup)}  # fmt: skip
+    run: dict[str, Any] = {"sector": sector, "zones": list(zones), "rotor_zones": list(rotor_zones), "axis": axis,
+           "airspeed_m_s": airspeed_m_s, "density_kg_m3": density_kg_m3, "reference": words(reference),
+           "setup": words(setup)}  # fmt: skip
     left = [os.fspath(heading) for heading in ([ignore] if isinstance(ignore, str) else ignore)]
     stated: dict[str, Any] = {}
     of_tables = {"airspeed_m_s": airspeed_m_s, "density_kg_m3": density_kg_m3}

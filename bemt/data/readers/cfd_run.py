@@ -77,6 +77,7 @@ class RunHead(Table):
     axis: Literal["x", "y", "z"] | None = entry("axis of the shaft; the largest force if omitted")
     zones: tuple[str, ...] | None = entry("zones whose loads count, duct included")
     duct_zones: tuple[str, ...] | None = entry("those of the zones that are the duct; by their names if omitted")
+    rotor_zones: tuple[str, ...] | None = entry("those that turn: their moment is the torque; by name if omitted")
     ignore: tuple[str, ...] | None = entry("headings that count for nothing")
 
 
@@ -88,17 +89,17 @@ class GridTable(Table):
 
 
 class ReferenceTable(Table):
-    """[reference]: what force and moment coefficients rest on."""
+    """[reference]: what coefficients rest on, and the density by which a program made its forces."""
 
     area_m2: float | None = entry("area", "m2", 1e-8, 1e6)
     length_m: float | None = entry("length of moments", "m", 1e-6, 1e4)
     speed_m_s: float | None = entry("speed", "m/s", 1e-3, 2000.0)
-    density_kg_m3: float | None = entry("density", "kg/m3", 0.01, 1100.0)
+    density_kg_m3: float | None = entry("density; loads in units go with that of the run", "kg/m3", 0.01, 1100.0)
     sound_m_s: float | None = entry("speed of sound, of disks in Flow360", "m/s", 1.0, 6000.0)
 
 
 class SetupTable(Table):
-    """[setup]: how the run was computed; no load depends on it, only gci_pct sets an uncertainty."""
+    """[setup]: how the run was computed; no load depends on it, only the two gci set an uncertainty."""
 
     program: str | None = entry("program")
     solver: str | None = entry("solver")
@@ -109,6 +110,7 @@ class SetupTable(Table):
     cells: float | None = entry("cells of the grid", low=10, high=1e12)
     grids: int | None = entry("grids of the grid study; 0 or 1 is none", low=0, high=20)
     gci_pct: float | None = entry("grid convergence index of the thrust", "%", 0.0, 200.0)
+    gci_torque_pct: float | None = entry("that of the torque", "%", 0.0, 200.0)
     domain_over_D: float | None = entry("diameter of the domain over that of the disk", low=0.5, high=1000)
     wall: Literal["function", "scalable", "automatic", "resolved"] | None = entry("wall treatment")
     y_plus: float | None = entry("mean distance of the first cell in wall units", low=0.0, high=1e5)

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
-from bemt.data.readers import Reader, SourceText, head_text, load_text, number
+from bemt.data.readers import Reader, SourceText, head_text, load_text, number, slices
 from bemt.physics.sections.polars import ExtrapolatedTable, Polar, from_tables
 
 POLAR_CSV = "polar_csv"
@@ -52,7 +52,8 @@ def sniff_polar_csv(head: bytes | str) -> bool:
     for line in head_text(head).splitlines():
         if line.strip() and not line.lstrip().startswith("#"):
             cells = [c.lower() for c in _cells(line)]
-            return len(cells) > 2 and {"cl", "cd"} <= set(cells) and any(c.startswith("alpha") for c in cells)
+            known = len(cells) > 2 and {"cl", "cd"} <= set(cells) and any(c.startswith("alpha") for c in cells)
+            return known and not slices.sniff(line)  # sections along a blade are no polar
     return False
 
 

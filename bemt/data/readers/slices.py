@@ -17,7 +17,7 @@ import numpy as np
 from bemt.base import units
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, refuse
-from bemt.data.readers import load_text, number
+from bemt.data.readers import Reader, head_text, load_text, number
 from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.headings import channel_of, heading
 from bemt.data.readers.split import decimal_mark, some, split_table
@@ -66,13 +66,26 @@ def slice_heading(text: str) -> tuple[str, float] | str:
             return "no unit"
         factor = _per_length(LOADS[quantity], stated)
         return (quantity, factor) if factor else f"{stated!r} is no {LOADS[quantity]} per length"
-    own = heading(text)
     name = base if found else units.split_suffix(base)[0]
     if _RADIUS.fullmatch(name):
+        own = heading(text)
         if own.unit is None or own.unit.dimension != "length":
             return "no unit" if not stated else f"{stated!r} is no length"
         return "r", own.unit.factor
     return ""
+
+
+def sniff(head: bytes | str) -> bool:
+    r"""Tell whether a table holds loads, or lift and drag, at radii: no polar, no recording.
+
+    >>> sniff('"Radius (m)","Thrust per Length (N/m)"'), sniff("r_m,chord_m,alpha_deg,cl,cd"), sniff("r_mm,chord_mm")
+    (True, True, False)
+    """
+    lines = (t for t in head_text(head).splitlines() if t.strip() and not t.lstrip().startswith("#"))
+    cells = [c.strip(' "') for c in re.split(r"[;\t,]", next(lines, ""))]
+    known = {c for c in map(slice_heading, cells) if c}
+    section = {"cl", "cd"} <= {c.lower() for c in cells}
+    return any(k[0] == "r" for k in known if isinstance(k, tuple)) and (len(known) > 1 or section)
 
 
 def _per_length(dimension: str, text: str) -> float:
@@ -135,3 +148,6 @@ def _slices(file: str, run: str, names: list[str], values: Array) -> Slices:
             raise InputError(Fault(file, key, got, "one value in each run", "A column run keeps the runs apart"))
         stated[key] = float(v[key][0])
     return Slices(v["r"], v["thrust"], v["torque"], stated)
+
+
+READERS = (Reader("slices", sniff, read),)

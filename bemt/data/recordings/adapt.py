@@ -21,6 +21,7 @@ from bemt.data.readers import load_bytes, polars_c81, uiuc
 from bemt.data.readers.apc import ApcPerformance
 from bemt.data.readers.references import Reference
 from bemt.data.readers.samples import Channel, dataset
+from bemt.data.readers.slices import Slices
 from bemt.data.recordings.cfd_files import EXPORT
 from bemt.data.recordings.channels import named
 from bemt.data.recordings.check import Finding, check
@@ -177,6 +178,8 @@ def adapt(found: Any, form: str, name: str) -> Dataset:
     >>> adapt(Dataset("bench", "stand", {"rpm": [6000.0, 7000.0], "thrust_N": [10.0, 13.5]}), "csv", "a.csv")
     Dataset('bench', 'stand', 2 points: rpm, thrust_N)
     """
+    if isinstance(found, Mapping):
+        return _along(found, form, name)
     made = _dataclass(found, form, name) if is_dataclass(found) and not isinstance(found, type) else None
     if isinstance(found, (list, tuple)) and found:
         make = next((make for kind, make in _LISTS.items() if all(isinstance(item, kind) for item in found)), None)
@@ -232,6 +235,19 @@ def _references(found: list[Reference], form: str, name: str) -> Dataset:
     kinds = {item.kind for item in found}
     kind = kinds.pop() if len(kinds) == 1 else "table"
     return dataset(form, kind, _channels(columns), (), {"file": name, "sha256": found[0].sha256})
+
+
+def _along(found: Mapping[str, Slices], form: str, name: str) -> Dataset:
+    """Loads along the blade, a run after the other, with their sums."""
+    notes = [f"{run}: {np.trapezoid(s.thrust, s.r):.4g} N and {np.trapezoid(s.torque, s.r):.4g} N m between the radii "
+             f"{s.r[0]:.4g} and {s.r[-1]:.4g} m" for run, s in found.items()]  # fmt: skip
+    notes.append(
+        f"taken for loads of all blades; `bemt diagnose RECORDING --case CASE --along {name}` sets them beside BEMT"
+    )
+    columns = {"r_m": "r", "thrust_per_radius_N_m": "thrust", "torque_per_radius_Nm_m": "torque"}
+    channels = {k: Channel(np.concatenate([getattr(s, a) for s in found.values()]), k.split("_", 3)[-1] if a != "r"
+                           else "m") for k, a in columns.items()}  # fmt: skip
+    return dataset(form, "table", channels, notes, {"file": name})
 
 
 def _propellers(found: list[uiuc.UiucPropeller], form: str, name: str) -> Dataset:

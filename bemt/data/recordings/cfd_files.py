@@ -31,8 +31,8 @@ EXPORT = (
 )
 """Where loads come from."""
 SEVERAL = (
-    "Several runs? Import each with --out, then give the .toml files together. A restart with its own clock: alone. "
-    "One condition on several grids: --setup cells=a,b,c, a number for each grid"
+    "One condition on several grids: --setup cells=a,b,c, a number for each grid. Other runs: import each with --out, "
+    "then give the .toml files together. A restart with its own clock: alone"
 )
 SCATTERED = 0.02
 """Spread of the means of single revolutions above which a load is not periodic. [1]"""
@@ -100,7 +100,7 @@ def read_run(paths: Sequence[Path]) -> tuple[list[tuple[str, Dataset]], list[Fau
 
 def _joined(read: list[tuple[str, Dataset]], faults: list[Fault]) -> list[tuple[str, Dataset]]:
     out: list[tuple[str, Dataset]] = []
-    others: list[str] = []
+    others: dict[str, list[str]] = {"from the same start": [], "on another clock": []}
     for name, record in read:
         home = home_of(name, record)
         at = next((k for k, (file, other) in enumerate(out) if home == home_of(file, other)), None)
@@ -116,7 +116,8 @@ def _joined(read: list[tuple[str, Dataset]], faults: list[Fault]) -> list[tuple[
             before, record, then, now = record, before, now, then
             how = relation(then, now)
         if how == "other clock":
-            others += [name]
+            again = all(np.array_equal(a[:1], b[:1]) for a, b in zip(then, now, strict=True))
+            others["from the same start" if again else "on another clock"].append(name)
             continue
         cut = now[0][0]
         kept = then[0] < cut
@@ -124,9 +125,10 @@ def _joined(read: list[tuple[str, Dataset]], faults: list[Fault]) -> list[tuple[
         note = f"{Path(name).name} {how} {Path(file).name}: joined at step {cut:g}"
         notes = (*before.notes, note)
         out[at] = file, replace(before, values=values, u={}, flags=(), lines=(), texts={}, notes=notes)
-    if others:
-        got = f"the same columns in {some(others, 3)}, on another clock"
-        faults.append(Fault(out[0][0], "", got, "files of one run", SEVERAL))
+    for how, names in others.items():
+        if names:
+            got = f"the same columns in {some(names, 3)}, {how}"
+            faults.append(Fault(out[0][0], "", got, "files of one run", SEVERAL))
     return out
 
 

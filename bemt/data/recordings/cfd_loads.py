@@ -21,12 +21,17 @@ from bemt.data.readers.cfd_run import QUANTITIES, RunColumn, RunToml
 from bemt.data.readers.headings import CELLS, channel_of, heading, may_be_shaft_speed, meanings, other_dimension
 from bemt.data.readers.unit_text import BY_THE_CASE
 from bemt.data.recordings.cfd_files import Settled, settled, zone_of
-from bemt.data.recordings.cfd_setup import Elsewhere
+from bemt.data.recordings.cfd_setup import FLIES, Elsewhere
 from bemt.physics.dataset import Dataset
 
 _ALONG = 3.0  # a thrust stands out of the side forces by this factor, or the shaft is not along an axis
 DUCT = re.compile(r"duct|shroud|nozzle|nacelle|casing|housing|\bring\b|\blip\b|kort", re.IGNORECASE)
 """Name of a zone that is the duct."""
+_STILL = re.compile(r"stator|vane|strut|pylon|support|leitrad|(?<![a-z])(ogv|igv|pod)(?![a-z])", re.IGNORECASE)
+_TURNS = re.compile(r"blade|rotor|prop|impeller|spinner|hub|nabe|(?<![a-z])fan(?![a-z])", re.IGNORECASE)
+"""Names of zones that stand still, whatever else they say (``stator_blade``), and of those on the shaft."""
+_SLIGHT = 0.01
+"""Share of the shaft's moment that a zone of unknown part may have without being asked about [1]."""
 NET = ("net", "total", "")
 _FORCE = re.compile(r"force_total(?:_([xyz]))?(?:_N)?( along .*)?|C(?:F)([xyz])")
 _MOMENT = re.compile(r"moment_total(?:_([xyz]))?(?:_Nm)?( along .*)?|C(?:M)([xyz])")
@@ -78,6 +83,12 @@ class LoadColumn:
         """Heading without what programs append, and without its unit."""
         word = re.sub(r"[-_ ](op|rfile)$", "", self.stem)
         return word.removesuffix(f"_{self.unit}") if self.unit else word
+
+    @property
+    def of_reference(self) -> bool:
+        """Whether the heading is a coefficient of which only the user knows the reference: ``ct``, ``cd-1``."""
+        bare = re.fullmatch(r"c[a-z]?[a-z]([-_]\w*)?|.*coeff.*", self.words, re.IGNORECASE)
+        return bool(bare) and self.unit in ("", "-") and not self.coefficient[0]
 
     @property
     def coefficient(self) -> tuple[str, float]:
@@ -132,6 +143,7 @@ class OpenRun:
     notes: list[str] = field(default_factory=list)
     faults: list[Fault] = field(default_factory=list)
     used: set[str] = field(default_factory=set)  # names of columns that became something
+    rested: set[str] = field(default_factory=set)  # reference values that a load rests on
     size_unit: str = ""  # of a column of cell sizes, SI; "" if not known
     zones: frozenset[str] = frozenset()  # whose forces are the thrust
     elsewhere: list[Elsewhere] = field(default_factory=list)
@@ -187,8 +199,8 @@ class OpenRun:
             got = f"{told}, where the file says {c.unit}"
             self.fault(c, c.name, got, "the unit of the file", f"Leave out --unit {quantity}={told!r}")
             return None
-        if not c.unit and not told and (c.of_sound or (c.part and c.axis)):
-            factor = self._of_sound(c) if c.of_sound else self._reference(c)
+        if not c.unit and not told and (c.of_sound or (c.part and c.axis) or (c.of_reference and quantity in _VECTOR)):
+            factor = self._of_sound(c) if c.of_sound else self._reference(c, c.part or _VECTOR.get(quantity, ""))
             return None if factor is None else c.record[c.name] * factor
         if unit is None:
             usual = QUANTITIES[quantity][1]
@@ -215,36 +227,79 @@ class OpenRun:
             got = f"no {size}: Flow360 divides loads of disks by density, speed of sound and the unit of the grid"
             self.fault(c, c.name, got, "what it divided by", hint)
             return None
+        self.rested |= {"density_kg_m3", "sound_m_s", "length_m"}
         return rho * a**2 * unit**2 * {"force": 1.0, "moment": unit}.get(c.part, a)
 
-    def _reference(self, c: LoadColumn) -> float | None:
-        """Newtons, or newton metres, for one of a coefficient."""
+    def _reference(self, c: LoadColumn, part: str) -> float | None:
+        """Newtons, or newton metres, for one of a coefficient; a propeller's own has n D, 2 D^2 and D for reference."""
         ref, head = self.run.reference, self.run.run
         rho = ref.density_kg_m3 or head.density_kg_m3
         force = float(c.record["RefForce"][-1]) if "RefForce" in c.record else math.nan
         if math.isnan(force) and rho and ref.area_m2 and ref.speed_m_s:
             force = 0.5 * rho * ref.speed_m_s**2 * ref.area_m2
-        length = 1.0 if c.part == "force" else ref.length_m
+            self.rested |= {"density_kg_m3", "speed_m_s", "area_m2"}
+        length = 1.0 if part == "force" else ref.length_m
+        self.rested |= set() if part == "force" else {"length_m"}
         if math.isnan(force) or length is None:
             hint = "--reference area=A,length=L,speed=V,density=RHO in m2, m, m/s, kg/m3, as set in the solver"
             self.fault(c, c.name, "a coefficient", "the reference values it rests on", hint)
             return None
         return force * length
 
-    def sign(self, quantity: str, values: Array, others: Mapping[str, float]) -> float:
-        """Sign of a load: as told, that of the whole for the duct's part, else the one that makes it positive."""
-        told, name = self.fact(quantity).sign, CHANNEL[quantity]
-        middle = np.nanmedian(values) if np.isfinite(values).any() else 0.0
-        if told is not None:
-            if told * middle < 0:
-                why = "a rotor that is driven by the flow" if quantity != "thrust" else "thrust backwards"
-                self.notes.append(f"{name} is {told * middle:.4g} by the sign that is stated, {told:+d}: {why}")
-            return float(told)
-        if quantity == "duct_thrust":
-            return others.get("thrust", 1.0)
-        if middle < 0:
-            self.notes.append(f"{name} is {middle:.4g} in the file: taken as positive (--sign {quantity}=1 keeps it)")
-        return -1.0 if middle < 0 else 1.0
+    def signs(self, loads: Mapping[str, Settled], state: Mapping[str, Array]) -> dict[str, float]:
+        """Sign of each load: as told, that of the whole for the duct's part, else the one that makes it positive.
+
+        In flight a rotor may brake, and the flow may drive it. What a pull or a flow can give of power, thrust times
+        airspeed at most (actuator disk), tells which; what is open then is asked for.
+        """
+        known = [k for k in ("airspeed_m_s", "rpm") if k in state]
+        V, rpm = (np.nan_to_num(state[k]) if k in known else np.zeros(1) for k in ("airspeed_m_s", "rpm"))
+        slowest, flies = float(V.min()), float(V.min()) > FLIES
+        middle = {q: _middle(f.values[V == slowest] if V.size == f.values.size else f.values) for q, f in loads.items()}
+        shaft = max((abs(middle[q]) * (1.0 if q == "power" else float(np.median(rpm)) * math.pi / 30.0)
+                     for q in ("torque", "power") if q in loads), default=math.inf)  # fmt: skip
+        brakes = slowest * abs(middle.get("thrust", 0.0)) > shaft  # no pull gives more than its shaft
+        out: dict[str, float] = {}
+        for quantity, value in middle.items():
+            told, name, sign = self.fact(quantity).sign, CHANNEL[quantity], -1.0 if value < 0 else 1.0
+            if told is not None:
+                sign = float(told)
+                if told * value < 0:
+                    why = "a rotor that is driven by the flow" if quantity != "thrust" else "thrust backwards"
+                    self.notes.append(f"{name} is {told * value:.4g} by the sign that is stated, {told:+d}: {why}")
+            elif quantity == "duct_thrust":
+                sign = out.get("thrust", 1.0)
+            elif value < 0 and flies and quantity == "thrust" and brakes:
+                sign, why = (
+                    1.0,
+                    f"as a pull it would give {slowest * abs(value) / shaft:.3g} times the power of the shaft",
+                )
+                self.notes.append(f"{name} is {value:.4g} in the file: kept, since {why}")
+            elif value < 0 and flies and (brakes or quantity == "thrust" or "thrust" not in loads):
+                got, may = f"{value:.4g} in the file at {slowest:.4g} m/s", "its sign: in flight a rotor may brake"
+                may += "" if quantity == "thrust" else ", and the flow may drive it"
+                self.fault(None, quantity, got, may, f"--sign {quantity}=1 keeps it, --sign {quantity}=-1 turns it")
+            elif value < 0:
+                self.notes.append(
+                    f"{name} is {value:.4g} in the file: taken as positive (--sign {quantity}=1 keeps it)"
+                )
+            out[quantity] = sign
+        return out
+
+    def of_density(self, loads: Mapping[str, Settled], state: Mapping[str, Array]) -> Array:
+        """Density of the run over the one that its program took for it; reference values without effect are faults."""
+        left = {k: v for k, v in self.run.reference.given().items() if k not in self.rested}
+        taken, rho = left.pop("density_kg_m3", None) if loads else None, state.get("density_kg_m3")
+        for key, value in left.items():
+            self.fault(None, f"reference.{key}", f"{value:g}", "nothing: no load here rests on it", "Leave it out")
+        if taken is None:
+            return np.ones(1)
+        if rho is None:
+            got = f"loads of a program that took {taken:g} kg/m3, and no density of the run"
+            self.fault(None, "density", got, "the density of the run", "--density-kg-m3 RHO: loads go with it")
+            return np.ones(1)
+        self.notes.append(f"loads times {_middle(rho) / taken:.4g}: the program took a density of {taken:g} kg/m3")
+        return np.asarray(rho / taken)
 
     def mean(self, quantity: str, c: LoadColumn) -> Settled | None:
         """Settled value of one column."""
@@ -326,6 +381,17 @@ def _fits(c: LoadColumn, quantity: str) -> bool:
     return {"P_W": "power_W"}.get(name, name) == _MEANT.get(quantity)  # CFD has no electrical power
 
 
+def _middle(values: Array) -> float:
+    """Median of what is finite; 0 of nothing."""
+    return float(np.nanmedian(values)) if np.isfinite(values).any() else 0.0
+
+
+def _level(c: LoadColumn) -> float:
+    """Mean of the last fifth of a column, as the file has it."""
+    tail = c.record[c.name][-max(1, len(c.record) // 5) :]
+    return float(np.mean(tail[np.isfinite(tail)])) if np.isfinite(tail).any() else 0.0
+
+
 def _axis(run: OpenRun, forces: Sequence[LoadColumn], moments: Sequence[LoadColumn]) -> str:
     """Axis of the shaft: as given, else that of the largest force."""
     if run.run.run.axis:
@@ -333,8 +399,7 @@ def _axis(run: OpenRun, forces: Sequence[LoadColumn], moments: Sequence[LoadColu
     lead = forces or moments
     size: dict[str, float] = {}
     for c in lead:
-        tail = c.record[c.name][-max(1, len(c.record) // 5) :]
-        size[c.axis] = size.get(c.axis, 0.0) + abs(float(np.nanmean(tail)))
+        size[c.axis] = size.get(c.axis, 0.0) + abs(_level(c))
     axis = max(size, key=lambda a: size[a])
     side = max((v for a, v in size.items() if a != axis), default=0.0)
     if size[axis] < _ALONG * side:
@@ -403,12 +468,38 @@ def _stated_zones(run: OpenRun, quantity: str, pool: Mapping[str, LoadColumn], z
     if torque and not known and list(pool) == [""]:
         return [""]
     if torque and known:
-        bare = [z for z in absent if not DUCT.search(z)]
+        bare = [z for z in absent if not run.is_duct(z)]
         run.notes += [f"torque: no column for {', '.join(bare)}"] if bare else []
     elif absent:
         hint = f"Zones: {', '.join(z or 'the whole' for z in pool)}"
         run.fault(None, "zones", ", ".join(absent), f"zones with a {quantity}", hint)
     return known
+
+
+def _on_shaft(run: OpenRun, pool: Mapping[str, LoadColumn], zones: Sequence[str]) -> list[str]:
+    """Those of some zones whose moment is the shaft's torque: as stated, else by name and by the sense of the moment.
+
+    A duct and a stator stand still, and no zone on the shaft turns against the blades. A zone of unknown part counts
+    where nothing stands still; beside parts that do, and where no name tells the blades, it is asked for.
+    """
+    told = run.run.run.rotor_zones
+    if told is not None:
+        if absent := [z for z in told if z not in pool]:
+            run.fault(None, "rotor_zones", ", ".join(absent), f"zones with a torque: {', '.join(zones)}")
+        return [z for z in zones if z in told]
+    moment = {z: _level(pool[z]) for z in zones if not (run.is_duct(z) or _STILL.search(z))}
+    named = [z for z in moment if _TURNS.search(z)]
+    whole = sum(moment[z] for z in named or moment)
+    against = [z for z in moment if moment[z] * whole < 0.0]
+    if len(moment) == len(zones) and sum(abs(moment[z]) for z in against) <= _SLIGHT * abs(whole):
+        return list(moment)
+    shaft = named or sorted(moment, key=lambda z: -abs(moment[z]))[:1]
+    doubt = [z for z in moment if (z in shaft) == (z in against)] if named else [z for z in moment if z not in shaft]
+    if sum(abs(moment[z]) for z in doubt) > _SLIGHT * abs(whole):
+        got = "torque of " + ", ".join(f"{z} {m:+.4g}" for z, m in moment.items())
+        hint = f"--rotor-zones {','.join(z for z in shaft if z not in doubt)}: those on one shaft; thrust counts all"
+        run.fault(None, "zones", got, "the zones that turn with the shaft", hint)
+    return shaft
 
 
 def counted_zones(
@@ -419,13 +510,17 @@ def counted_zones(
     ducts = [z for z in pool if run.is_duct(z)]
     if zones is not None:
         known = _stated_zones(run, quantity, pool, zones)
-        shaft = [z for z in known if not (torque and z in ducts)]
+        shaft = _on_shaft(run, pool, known) if torque and len(known) > 1 else known
+        if left := [z for z in known if z not in shaft] if shaft else []:
+            run.notes.append(f"torque is that of {' + '.join(shaft)}, without {', '.join(left)}: the shaft's own")
         return [(1.0, z) for z in shaft or known], [z for z in known if z in ducts]
     net = next((z for z in pool if z.lower() in NET), None)
     if net is not None:
-        less = ducts if torque else []
+        parts = [z for z in pool if z != net] if torque else []
+        turning = _on_shaft(run, pool, parts) if parts else []
+        less = [z for z in parts if z not in turning]
         if less:
-            run.notes.append(f"torque: {net or 'the whole'} less {', '.join(less)}: the shaft's own")
+            run.notes.append(f"torque: {net or 'the whole'} less {', '.join(less)}: the shaft's own; thrust counts all")
         return [(1.0, net), *((-1.0, z) for z in less)], ducts
     if len(pool) > 1:
         names = ",".join(pool)

@@ -124,8 +124,8 @@ def run_from(
     files: Sequence[str], *, rpm: float | None = None, airspeed_m_s: float | None = None,
     density_kg_m3: float | None = None, revolutions: int | None = None, sector: int | None = None,
     axis: str | None = None,
-    zones: Sequence[str] = (), unit: Sequence[str] = (), column: Sequence[str] = (), sign: Sequence[str] = (),
-    reference: Sequence[str] = (), setup: Sequence[str] = (), ignore: Sequence[str] = (),
+    zones: Sequence[str] = (), rotor_zones: Sequence[str] = (), unit: Sequence[str] = (), column: Sequence[str] = (),
+    sign: Sequence[str] = (), reference: Sequence[str] = (), setup: Sequence[str] = (), ignore: Sequence[str] = (),
 ) -> RunToml:  # fmt: skip
     """Make a run of options; all their faults at once.
 
@@ -156,7 +156,8 @@ def run_from(
             columns.setdefault(quantity, {})["sign"] = found[1]
     head = {"files": tuple(files), "rpm": rpm, "airspeed_m_s": airspeed_m_s, "density_kg_m3": density_kg_m3,
             "revolutions": revolutions, "sector": sector, "axis": axis,
-            "zones": tuple(_split(zones)) or None, "ignore": tuple(ignore) or None}  # fmt: skip
+            "zones": tuple(_split(zones)) or None, "rotor_zones": tuple(_split(rotor_zones)) or None,
+            "ignore": tuple(ignore) or None}  # fmt: skip
     told = _setup(setup, faults)
     if grids := _grids(files, told, faults):
         del head["files"], told["cells"]

@@ -36,7 +36,14 @@ from bemt.data.recordings.cfd_loads import (
     other_axes,
     other_than_loads,
 )
-from bemt.data.recordings.cfd_setup import CfdRun, Elsewhere, conditions_text, with_grid_floor
+from bemt.data.recordings.cfd_setup import (
+    THRUSTS,
+    TORQUES,
+    CfdRun,
+    Elsewhere,
+    conditions_text,
+    with_grid_floor,
+)
 from bemt.data.recordings.channels import moves
 from bemt.data.recordings.check import check
 from bemt.data.recordings.grid_study import CELL_SIZE, COVERAGE, by_grid, groups, together
@@ -142,7 +149,9 @@ def _opened(run: RunToml, folder: Path, name: str) -> tuple[OpenRun, list[tuple[
     if not faults:
         faults = [Fault(name, "ignore", repr(n), f"one of {', '.join(known)}") for n in ignore if n not in known]
     columns = [c for c in columns if c.name not in ignore and c.stem not in ignore]
-    notes = [n for _, r in read for n in r.notes if "restart" in n or "joined" in n or "left out" in n]
+    told = {"restart": False, "joined": False, "left out": False, "rhoInf": bool(run.reference.density_kg_m3),
+            "--sector": bool(run.run.sector)}  # fmt: skip
+    notes = [n for _, r in read for n in r.notes if any(word in n and not said for word, said in told.items())]
     return OpenRun(run, name, columns, complete=not faults, notes=notes, faults=faults), read
 
 
@@ -227,6 +236,9 @@ def _nothing(work: OpenRun) -> None:
         return work.fault(None, "", f"{what} ({known})", NO_LOAD, EXPORT)
     first = next((c.name for c in work.columns if not c.unit and not heading(c.words).unit), "NAME")
     hint = f'Say which it is by its unit: --unit "{first}=N" for a thrust, "{first}=N m" for a torque'
+    if rest := list(dict.fromkeys(c.words for c in work.columns if c.of_reference)):
+        hint = f"Coefficients: --column thrust={rest[0]}{f' torque={rest[1]}' if len(rest) > 1 else ''} --reference "
+        hint += "area=A,length=L,speed=V,density=RHO of the solver; of T/(rho n^2 D^4) they are 2 D^2, D and n D"
     work.fault(None, "", f"columns {known}", NO_LOAD, hint)
 
 
@@ -282,13 +294,12 @@ def _applied(work: OpenRun, rpm: Array, loads: Mapping[str, Settled]) -> _Points
     """Sector and sign applied, the operating point beside the loads."""
     sector, points = work.run.run.sector or 1, _Points(_operating(work, rpm))
     values = points.values
-    signs: dict[str, float] = {}
+    signs, times = work.signs(loads, values), sector * work.of_density(loads, values)
     for quantity, found in loads.items():
         name = CHANNEL[quantity]
-        signs[quantity] = work.sign(quantity, found.values, signs)
-        values[name] = signs[quantity] * sector * found.values
-        size = math.hypot(*(abs(x) for x in (found.drift, found.scatter) if math.isfinite(x)), 0.0) * sector
-        points.u[name] = np.full(found.values.size, size)
+        values[name] = signs[quantity] * times * found.values
+        size = math.hypot(*(abs(x) for x in (found.drift, found.scatter) if math.isfinite(x)), 0.0)
+        points.u[name] = np.broadcast_to(size * times, values[name].shape).copy()
         points.averaged[name] = found.over
         mean = float(np.nanmean(np.abs(found.values))) if np.isfinite(found.values).any() else math.nan
         if math.isfinite(found.drift) and mean:
@@ -366,9 +377,15 @@ def _conditions(
         "cells": float(each[0]) if each is not None and np.unique(each).size == 1 else cells,
         "steady": False if "time" in clocks else True if "iteration" in clocks else None, "thrust_from": "forces",
     }  # fmt: skip
-    gci = work.run.setup.gci_pct
-    more = {"drift_thrust": drift, "u_grid": None if gci is None else 0.01 * gci / COVERAGE}
+    more = {"drift_thrust": drift, "u_grid": _stated_grid(work).get("thrust_N")}
     return {k: v for part in (found, work.run.setup.given(), more) for k, v in part.items() if v is not None}
+
+
+def _stated_grid(work: OpenRun) -> dict[str, float]:
+    """Standard uncertainty by the grid as stated, by channel [1]: of one load it says nothing of the other."""
+    told = work.run.setup
+    own = ((THRUSTS, told.gci_pct), (TORQUES, told.gci_torque_pct))
+    return {k: 0.01 * gci / COVERAGE for channels, gci in own if gci is not None for k in channels}
 
 
 def _dataset(work: OpenRun, points: _Points, read: Sequence[tuple[str, Dataset]]) -> CfdRun:
@@ -397,13 +414,17 @@ def _dataset(work: OpenRun, points: _Points, read: Sequence[tuple[str, Dataset]]
         note = f"{number_of((~keep).sum(), 'point')} without a load left out"
         made = replace(made.select(keep), notes=(*made.notes, note))
         each = None if each is None else np.broadcast_to(each, (rows,))[keep]
-    found = () if work.elsewhere else check(made)  # what lies elsewhere is no slip of a unit
+    found = (
+        () if work.elsewhere else check(made, ducted="duct_thrust_N" in full)
+    )  # what lies elsewhere is no slip of a unit
     fluid = "" if "density_kg_m3" in full else "density, not stated and taken for that of air (--density-kg-m3), or "
     slips = (f"{f.evidence}. Suggestion: {fluid}{f.correction}" for f in found if f.severity != "note")
     made = replace(made, notes=(*slips, *made.notes))
     if each is not None and np.unique(each).size > 1:
         return by_grid(made, each, None if "cells" in values else work.size_unit)
-    return with_grid_floor(made, conditions.get("u_grid", math.nan))
+    u = _stated_grid(work)
+    told = ", ".join(f"{k.split('_')[0]} {u[k]:.2%}" for k in ("thrust_N", "torque_Nm") if k in u)
+    return with_grid_floor(made, u, (f"u of the grid: {told}, as stated",) if u else ())
 
 
 _SHOWN = {"rpm": "rev/min", "airspeed_m_s": "V [m/s]", "J": "J", "thrust_N": "thrust [N]",

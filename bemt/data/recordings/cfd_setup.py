@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -28,6 +28,8 @@ CONDITIONS = (
 _GRID = ("grid_level", "cells")
 _ALIAS = {"level": "grid_level", "grid": "grid_level", "mesh": "grid_level", "grid level": "grid_level"}
 _LIKE_CELLS, _LIKE_SIZE = 0.02, 0.02
+FLIES = 0.5
+"""Airspeed above which a rotor is not at rest [m/s]."""
 SETTLED = 0.01
 """Standard uncertainty of a settled load from point to point on one grid, share of it [1]."""
 GRID_FLOOR: Mapping[str, Mapping[str, float]] = {
@@ -40,6 +42,8 @@ Root mean square of the change from one grid to the next in our own runs (``repo
 so nothing smaller can be claimed): at rest ten pairs of neighbouring grids, 35,000 to 494,000 cells (``prop_8x5_grid``,
 ``prop_8x5_rest``, ``prop_8x5_zone``, ``ds30_spinner``, ``ds30_vanes``); in flight the one pair there is
 (``prop_8x5_zone``, J 0.4: 16.64 and 14.97 N, 0.342 and 0.314 N m). ``tests/test_cfd_runs.py`` recomputes them."""
+THRUSTS, TORQUES = ("thrust_N", "duct_thrust_N", "CT"), ("torque_Nm", "power_W", "CQ", "CP")
+"""Channels that one grid makes wrong alike."""
 GRID_FLOOR_SOURCE = "own runs, reports/cfd: rms change from one grid to the next"
 
 
@@ -49,8 +53,7 @@ def grid_floor(channel: str, in_flight: bool) -> float:
     >>> grid_floor("thrust_N", False), grid_floor("CQ", True)
     (0.057, 0.082)
     """
-    thrust = channel in ("thrust_N", "duct_thrust_N", "CT")
-    return GRID_FLOOR["flight" if in_flight else "rest"]["thrust_N" if thrust else "torque_Nm"]
+    return GRID_FLOOR["flight" if in_flight else "rest"]["thrust_N" if channel in THRUSTS else "torque_Nm"]
 
 
 def _flies(d: Dataset) -> NDArray[np.bool_]:
@@ -58,32 +61,31 @@ def _flies(d: Dataset) -> NDArray[np.bool_]:
     V, J = d.values.get("airspeed_m_s"), d.values.get("J")
     out = np.zeros(len(d), dtype=bool)
     if V is not None:
-        out |= np.nan_to_num(V) > 0.5
+        out |= np.nan_to_num(V) > FLIES
     if J is not None:
         out |= np.nan_to_num(J) > 0.02
     return out
 
 
 def with_grid_floor(
-    d: CfdRun, u_grid: float | Mapping[str, NDArray[np.float64]] = math.nan, notes: tuple[str, ...] = ()
+    d: CfdRun, u_grid: Mapping[str, NDArray[np.float64] | float], notes: tuple[str, ...] = ()
 ) -> CfdRun:
     """Loads of CFD with what their grid is worth [1]: as stated or studied, (N,) a load, else the floor; notes say."""
     random = {k: v.copy() for k, v in d.u.items() if np.isfinite(v).any()}
     numerics: dict[str, NDArray[np.float64]] = {}
     flies = _flies(d)
-    bare = np.zeros(len(d), dtype=bool)
-    for name in ("thrust_N", "duct_thrust_N", "torque_Nm", "power_W", "CT", "CQ", "CP"):
+    bare: set[str] = set()
+    for name in (*THRUSTS, *TORQUES):
         if name in d:
             least = np.array([grid_floor(name, bool(f)) for f in flies])
-            own = np.asarray(u_grid.get(name, math.nan) if isinstance(u_grid, Mapping) else u_grid, dtype=float)
+            own = np.asarray(u_grid.get(name, math.nan), dtype=float)
             open_ = np.broadcast_to(np.isnan(own), least.shape)
-            bare |= open_
+            bare |= {"thrust" if name in THRUSTS else "torque"} if open_.any() else set()
             numerics[name] = np.abs(d[name]) * np.where(open_, least, own)
     parts = {"random": {k: np.nan_to_num(v) for k, v in random.items() if k in numerics}, "numerics": numerics}
-    if bare.any() or not numerics:
-        notes = (floor_note(bool(flies.any()), bool(flies.all())), *notes)
-    elif not notes:
-        notes = (f"u of the grid {u_grid:.2%}, as stated",)
+    if bare or not numerics:
+        open_loads = sorted(bare) if notes and bare else ("thrust", "torque")
+        notes = (floor_note(bool(flies.any()), bool(flies.all()), open_loads), *notes)
     kept = {k: v for k, v in random.items() if k not in numerics}
     return replace(d, u=kept, u_by=parts, notes=(*notes, *d.notes))
 
@@ -96,13 +98,12 @@ def one_grid(run: Dataset) -> tuple[Dataset, dict[str, dict[str, float]]]:
     return replace(run, u=u, u_by={}), shared
 
 
-def floor_note(some_fly: bool, all_fly: bool) -> str:
-    """What a run without a grid study is told."""
+def floor_note(some_fly: bool, all_fly: bool, loads: Sequence[str] = ("thrust", "torque")) -> str:
+    """What a run without a grid study of some loads is told."""
     states = [s for s, wanted in (("rest", not all_fly), ("flight", some_fly)) if wanted]
     words = {"rest": "at rest", "flight": "in flight"}
-    sizes = "; ".join(
-        f"thrust {GRID_FLOOR[s]['thrust_N']:.1%}, torque {GRID_FLOOR[s]['torque_Nm']:.1%} {words[s]}" for s in states
-    )
+    channel = {"thrust": "thrust_N", "torque": "torque_Nm"}
+    sizes = "; ".join(f"{', '.join(f'{k} {GRID_FLOOR[s][channel[k]]:.1%}' for k in loads)} {words[s]}" for s in states)
     return f"no grid study: at least {sizes} ({GRID_FLOOR_SOURCE})"
 
 

@@ -212,7 +212,8 @@ def relations(facts: Facts) -> list[Relation]:
         powers = {"T": 1.0 + e, "D": -2.0 * e} if known else {"T": 1.0 + 0.5 * e, "n": e}
         powers = {k: powers.get(k, 0.0) - power.get(k, 0.0) for k in (*powers, *power)}
         merit = scale * q["T"] * (0.5 * V + w) / math.prod(q[k] ** p for k, p in power.items())
-        name = f"figure of merit from {words}" + ("" if known else ", diameter guessed by CT = 0.1")
+        merit_of = "figure of merit" if rows is still else "ideal power in flight over that"
+        name = f"{merit_of} from {words}" + ("" if known else ", diameter guessed by CT = 0.1")
         per_unit = merit / math.prod(q[k] ** p for k, p in powers.items())
         centre = usual[0] * (_IN_FLIGHT if rows is not still else 1.0)
         add(name, powers, per_unit, (low, most if known else guessed), (centre, usual[1]), rows)

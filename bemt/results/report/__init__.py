@@ -78,7 +78,7 @@ def write(
         from bemt.results.report.gather import diagnose_into
 
         diagnose_into(paths, recordings, folder, progress)
-    book = replace(gather(paths, folder, progress), about=About.from_document(about or {}))
+    book = replace(gather(paths, folder, progress, recordings), about=About.from_document(about or {}))
     files = folder / HTML_NAME, folder / MARKDOWN_NAME
     try:
         write_atomic(files[0], book_html(book))

@@ -165,12 +165,20 @@ ALL_BYTES = 4_000_000
 """Of all figures of diagnoses together, so that the report stays below 8 MB."""
 
 
-def gather(paths: Sequence[str | Path], out: Path, progress: Progress | None = None) -> Book:
-    """Solve the cases (or take up the results of a sweep in `out`) and compute what the report plots."""
+def gather(
+    paths: Sequence[str | Path], out: Path, progress: Progress | None = None, recordings: Sequence[str] = ()
+) -> Book:
+    """Solve the cases (or take up the results of a sweep in `out`) and compute what the report plots.
+
+    Of the `recordings` of the one case those that are runs of CFD stand beside it as if they lay in its folder.
+    """
+    from bemt.data.readers.cfd_run import sniff
     from bemt.results.sweep import sweep
 
     tell = progress or (lambda line: None)
-    swept = sweep(paths, out, progress=tell)
+    files = [p / "run.toml" if p.is_dir() else p for p in map(Path, recordings)]
+    runs = [p for p in files if p.suffix == ".toml" and p.is_file() and sniff(p.read_bytes()[:4096])]
+    swept = sweep(paths, out, progress=tell, beside=runs)
     pages = []
     for path, result in zip(find_cases(paths), swept.cases, strict=True):
         tell(f"report: {result.name}")

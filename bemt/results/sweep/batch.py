@@ -193,8 +193,9 @@ def _bar(share: float) -> str:
 def sweep(
     paths: Sequence[str | Path], out: str | Path | None = None, *, jobs: int | None = None, resume: bool = True,
     progress: Progress | None = None, engine: str = "local", scheduler: str | None = None,
+    beside: Sequence[Path] = (),
 ) -> Sweep:  # fmt: skip
-    """Solve cases."""
+    """Solve cases; `beside`, CFD runs that stand beside each of them."""
     _check_options(engine, scheduler, jobs)
     files = find_cases(paths)
     folder = None if out is None else Path(out)
@@ -213,7 +214,7 @@ def sweep(
             on = stack.enter_context(Cluster(scheduler, jobs))
         if folder is not None:
             store.clear_overview(folder)
-        ready, found = _read(files, folder)
+        ready, found = _read(files, folder, tuple(beside))
         todo = list(ready)
         tell = progress or (lambda line: None)
         left = [ready[i] for i in todo]
@@ -242,13 +243,15 @@ def _check_options(engine: str, scheduler: str | None, jobs: int | None) -> None
         require_extra("--engine dask", "dask", "distributed")
 
 
-def _read(files: Sequence[Path], out: Path | None) -> tuple[dict[int, Ready], dict[int, Result]]:
+def _read(
+    files: Sequence[Path], out: Path | None, beside: tuple[Path, ...]
+) -> tuple[dict[int, Ready], dict[int, Result]]:
     """Cases that can be solved, and results of those that cannot, by their place; each file is read once."""
     ready: dict[int, Ready] = {}
     failed: dict[int, Result] = {}
     for i, path in enumerate(files):
         try:
-            case = load_case(path)
+            case = replace(load_case(path), beside=beside)
             ready[i] = case, fingerprint(case.content_hash())
         except Exception as error:
             failed[i] = _failed(path, error)

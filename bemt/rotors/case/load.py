@@ -81,6 +81,7 @@ class Case:
     file: CaseFile  # The same, typed, with defaults
     assumptions: tuple[Assumption, ...] = ()  # Declared unknowns
     unused: tuple[str, ...] = ()  # What the file declares and states as well, as sentences
+    beside: tuple[Path, ...] = ()  # CFD runs elsewhere that count like those in its folder
     _built: dict[Any, Any] = field(default_factory=dict, repr=False)  # Shared by the cases that `replaced` gives
     _own: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)  # Of this very case
 
@@ -181,13 +182,12 @@ class Case:
 
     @property
     def run_paths(self) -> tuple[Path, ...]:
-        """CFD runs in the folder of the case: recorded values like those of the references.
+        """CFD runs in the folder of the case and beside it: recorded values like those of the references.
 
         Files that ``bemt import --out`` writes, by what is in them; a study stands in place of the runs that it names.
         """
-        if not self.path.is_file():
-            return ()
-        others = [p for p in sorted(self.folder.glob("*.toml")) if p != self.path]
+        own = sorted(self.folder.glob("*.toml")) if self.path.is_file() else []
+        others = list({p.resolve(): p for p in (*self.beside, *own) if p != self.path}.values())
         if not others:
             return ()
         from bemt.data.readers.cfd_run import sniff

@@ -14,6 +14,8 @@ from bemt.tools.exports.base import DiskExport, Files, Job
 from bemt.tools.exports.blades import baked
 from bemt.tools.exports.rotor_disk import tables
 
+_SU2_WAY = "AXIS points downstream: stream and wake along +x, DISK to DISK_BACK; thrust on the rotor along -x"
+
 
 class Su2DiskExport(DiskExport):
     """``ActuatorDisk.dat`` for ACTDISK_TYPE= VARIABLE_LOAD."""
@@ -37,7 +39,7 @@ class Su2DiskExport(DiskExport):
         x, ct, cp = r / p.R, thrust * p.R / scale, 2.0 * np.pi * torque * p.R / (scale * D)
         body = "\n".join(f" {a:.8f} {t:.9e} {q:.9e} 0.0" for a, t, q in zip(x, ct, cp, strict=True))
         text = f"""# {job.case.name}: {p.rpm:.9g} rev/min, {p.airspeed_m_s:.9g} m/s, {p.rho:.9g} kg/m3; load by BEMT
-# {job.rotation}
+# {job.rotation}; {_SU2_WAY}
 # CT = {p.thrust_N / scale:.9g}, CP = {2 * np.pi * p.torque_Nm / (scale * D):.9g} (rotor alone)
 MARKER_ACTDISK= DISK DISK_BACK
 CENTER= 0.0 0.0 0.0
@@ -48,7 +50,7 @@ NROW= {x.size}
 # rs=r/R    dCT/drs     dCP/drs     dCR/drs
 {body}
 """
-        config = """% In the configuration of SU2
+        config = f"""% In the configuration of SU2; {_SU2_WAY}
 MARKER_ACTDISK= ( DISK, DISK_BACK, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0 )
 ACTDISK_TYPE= VARIABLE_LOAD
 ACTDISK_FILENAME= ActuatorDisk.dat
