@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -27,9 +28,9 @@ def pytest_configure(config: pytest.Config) -> None:
     A table is found by the hash of all that decides it, so an old one cannot be taken for a new one; a fresh folder
     each time would only cost NeuralFoil's time again. Set before any test, so that child processes inherit it.
     """
-    if getattr(config.option, "numprocesses", None):
-        for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-            os.environ.setdefault(name, "1")  # a worker a core: more threads only wait for each other
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")  # more threads only wait for each other: small matrices, a worker a core
+    threadpool_limits(1, "blas")  # of numpy here, which is loaded already
     os.environ.setdefault("BEMT_COMPILE", "always")  # equal to the last bit, whichever call is the first
     cache = getattr(config, "cache", None)  # absent under -p no:cacheprovider: the user's cache serves then
     if cache is not None:

