@@ -27,11 +27,10 @@ from bemt.tools.cfd.openfoam.write import Run, settings_of
 from bemt.tools.exports import exports, target_ids
 from bemt.tools.exports.base import FEATURES, Files, Job, LoadsExport
 from bemt.tools.exports.blades import baked
-from bemt.tools.exports.flow_solvers import read_profile
+from bemt.tools.exports.flow_solvers import read_profile, read_vbm
 from bemt.tools.exports.folder import export_case
 from bemt.tools.exports.parts import entry
 from bemt.tools.exports.performance import solve_points
-from bemt.tools.exports.vbm import read_vbm
 from geometry import export as module
 from geometry.airfoil import naca4
 from geometry.common import GeometryError

@@ -26,9 +26,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -41,6 +42,7 @@ from bemt.data.recordings.cfd_setup import CONDITIONS, CfdRun, conditions_of, st
 from bemt.data.recordings.channels import named
 from bemt.physics.dataset import Dataset, concat
 
+T = TypeVar("T")
 FS_THREE = 1.25
 """Safety factor with three grids."""
 FS_TWO = 3.0
@@ -252,13 +254,17 @@ MOST = 3
 
 def groups(d: Dataset) -> list[list[int]]:
     """Rows of one condition each: speed, airspeed, density."""
-    out: list[list[int]] = []
-    for i in range(len(d)):
-        home = next((g for g in out if _alike(d, g[0], i)), None)
+    return _grouped(range(len(d)), lambda rows, i: _alike(d, rows[0], i))
+
+
+def _grouped(items: Iterable[T], fits: Callable[[list[T], T], bool]) -> list[list[T]]:
+    """Items in order, each in the first group that it fits, else in one of its own."""
+    out: list[list[T]] = []
+    for item in items:
+        home = next((group for group in out if fits(group, item)), None)
         if home is None:
-            out.append([i])
-        else:
-            home.append(i)
+            out.append(home := [])
+        home.append(item)
     return out
 
 
@@ -312,9 +318,8 @@ def by_grid(d: CfdRun, cells: Array, size_unit: str | None = None) -> CfdRun:
 
 def _state(d: Dataset, row: int) -> str:
     words = {"rpm": "rev/min", "airspeed_m_s": "m/s", "J": "J"}
-    return (
-        ", ".join(f"{d[k][row]:g} {w}" for k, w in words.items() if k in d and math.isfinite(d[k][row])) or "one speed"
-    )
+    told = [f"{d[k][row]:g} {w}" for k, w in words.items() if k in d and math.isfinite(d[k][row])]
+    return ", ".join(told) or "one speed"
 
 
 def _size(cells: float) -> float:
@@ -417,14 +422,8 @@ def merged(parts: Sequence[Dataset]) -> list[Dataset]:
     """Runs, those that are one condition on several grids as one study in the place of the first."""
     from bemt.data.recordings.cfd_run import is_run
 
-    out: list[list[Dataset]] = []
-    for d in parts:
-        home = next((g for g in out if is_run(d) and is_run(g[0]) and are_grids([*g, d])), None)
-        if home is None:
-            out.append([d])
-        else:
-            home.append(d)
-    return [together(g) if len(g) > 1 else g[0] for g in out]
+    found = _grouped(parts, lambda runs, d: is_run(d) and is_run(runs[0]) and are_grids([*runs, d]))
+    return [together(runs) if len(runs) > 1 else runs[0] for runs in found]
 
 
 CELL_SIZE = re.compile(r"((cell|mesh|grid|element|base)[_ ]?(size|spacing)|dx|h)(_m)?", re.IGNORECASE)

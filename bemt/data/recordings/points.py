@@ -56,7 +56,7 @@ _COMMANDS = ("pwm_s", "throttle")
 
 def command_of(rec: Dataset) -> tuple[str, Array] | None:
     """Find the command."""
-    for name in ("pwm_s", "throttle"):
+    for name in _COMMANDS:
         v = rec.values.get(name)
         if v is not None and np.any(np.isfinite(v)):
             return name, v
@@ -262,17 +262,15 @@ def _without(values: Array, rows: Sequence[int]) -> Array:
     return out
 
 
-def _rest(rows: Rows, data: Mapping[str, Array], when: float) -> Rest:
+def _rest(rec: Dataset, rows: Rows, data: Mapping[str, Array], when: float, run: float, found: Found) -> None:
+    """Keep the means of a stretch at rest, whose rows are no points."""
     mean, u = {}, {}
     for name, v in data.items():
         own = v[rows]
         own = own[np.isfinite(own)]
         if own.size:
             mean[name], u[name] = float(np.median(own)), plateaus.standard_error(own)
-    return Rest(when, mean, u)
-
-
-def _note_rest(found: Found, rec: Dataset, rows: Rows) -> None:
+    found.rests.setdefault(run, []).append(Rest(when, mean, u))
     found.lost += lost(rec, rows, "", "motor stopped: zero of the stand, not a point")
 
 
@@ -325,8 +323,7 @@ def from_samples(rec: Dataset, name: str) -> Found:
             middle = 0.5 * (p.t0 + p.t1)
             if np.mean(rest[own_rows]) > 0.5:
                 still, moving = own_rows[rest[own_rows]], own_rows[~rest[own_rows]]
-                found.rests.setdefault(run, []).append(_rest(still, data, middle))
-                _note_rest(found, rec, still)
+                _rest(rec, still, data, middle, run, found)
                 found.lost += lost(rec, moving, "", "stopping or starting")
                 continue
             for channel, outliers in p.outliers.items():
@@ -443,8 +440,7 @@ def _close(
     if rows.size:
         times = time[rows] if time is not None else rows.astype(float)
         when = float(np.mean(times)) if np.all(np.isfinite(times)) else float(np.mean(rows))
-        found.rests.setdefault(run, []).append(_rest(rows, data, when))
-        _note_rest(found, rec, rows)
+        _rest(rec, rows, data, when, run, found)
 
 
 def _wild(rec: Dataset, data: dict[str, Array], rest: NDArray[np.bool_], found: Found) -> None:

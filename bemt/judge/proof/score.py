@@ -101,10 +101,7 @@ def _matches(said: Sequence[str], allowed: Sequence[set[str]]) -> bool:
     """Whether every cause is met by one word that the plan cannot tell from it, and no word is left over."""
     if len(said) != len(allowed):
         return False
-    if len(said) == 1:
-        return said[0] in allowed[0]
-    a, b = said
-    return (a in allowed[0] and b in allowed[1]) or (a in allowed[1] and b in allowed[0])
+    return any(all(s in a for s, a in zip(order, allowed, strict=True)) for order in permutations(said))
 
 
 def in_sets(j: Judged) -> bool:
@@ -222,10 +219,6 @@ def _claimed(p: _Pool) -> list[ScoreRow]:
     visible = p.visible
     hidden = [j for j in p.told("single", "sensor", "underpowered") if not j.visible]
     with_cause = [j for j in p.of("single", "sensor", "pair", "underpowered") if j.claims]
-    by_reference = (
-        ("with", [j for j in visible if j.entry.referenced]),
-        ("without", [j for j in visible if not j.entry.referenced]),
-    )
     return [
         _share("claims on nulls, noise", (j.claims for j in p.told("null")), "<= 2 %", 0.02, True),
         _share("claims on nulls, solver mismatch only", (j.claims for j in p.told("mismatch")), "<= 2 %", 0.02, True),
@@ -234,8 +227,9 @@ def _claimed(p: _Pool) -> list[ScoreRow]:
         _share("right when it claims", (j.right for j in with_cause), ">= 98 %", 0.98),
         _share("claims that name only what is not at work", map(_beside, with_cause), "<= 3 %", 0.03, True),
         _share("claims on visible", (j.claims for j in visible), ">= 75 %", 0.75),
-        *(_share(f"claims on visible, {word} a reference", (j.claims for j in some), "", 0.0)
-          for word, some in by_reference),
+        *(_share(f"claims on visible, {word} a reference",
+                 [j.claims for j in visible if bool(j.entry.referenced) is told], "", 0.0)
+          for word, told in (("with", True), ("without", False))),
         _share("wrong claims on what the plan cannot see", (j.claims and not j.right for j in hidden), "<= 2 %", 0.02,
                True),
     ]  # fmt: skip

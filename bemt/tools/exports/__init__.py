@@ -40,6 +40,7 @@ EXPORTS = {
     "su2-disk": "bemt.tools.exports.flow_solvers:Su2DiskExport",
     "flow360": "bemt.tools.exports.flow_solvers:Flow360Export",
     "fan": "bemt.tools.exports.flow_solvers:FanExport",
+    "vbm": "bemt.tools.exports.flow_solvers:VbmExport",
     "gazebo": "bemt.tools.exports.simulators:GazeboExport",
     "rotorpy": "bemt.tools.exports.simulators:RotorpyExport",
     "mujoco": "bemt.tools.exports.simulators:MujocoExport",

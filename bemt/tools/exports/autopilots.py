@@ -9,7 +9,7 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.base.units import G0
 from bemt.tools.exports.base import Files, Job, LoadsExport
-from bemt.tools.exports.parts import header, plain_name
+from bemt.tools.exports.parts import header, plain_name, written
 
 # PX4: parameters of the simulator in hardware (SIH), of control allocation and of the thrust curve.
 
@@ -27,6 +27,17 @@ class Px4Export(LoadsExport):
     features = frozenset({"torque", "airspeed", "windmill", "density", "rest", "rotation"})
     conventions = "CT = T/(rho n^2 D^4), CP = P/(rho n^3 D^5), J = V/(n D); diameter in inches, RPM_MAX in rev/min"
     source = "PX4 1.17 simulator_sih: sih.cpp, sih_params.yaml (ranges); control_allocator/module.yaml"
+    told = (
+        "PX4 admits CT2 and CP2 up to 0 only: where the best quadratic bends upwards, a straight line is written",
+        "two files: thrust in the SIH is linear in u, so THR_MDL_FAC is 0; the vehicle gets the rotor's curve",
+        "u of the vehicle's THR_MDL_FAC is the share of full speed (an ESC that controls speed); for an ESC that "
+        "controls duty fit it to a bench map (`map`)",
+        "the sign of KM is for a rotor that turns as the case says; PX4 counts ccw from above as positive. The SIH "
+        "fixes the directions of its own rotors and takes no direction for the forward propeller",
+        f"CA_ROTOR0_CT is written up to the {MOST_CT:g} that PX4 takes; the allocation is normalised, so with "
+        "equal rotors the value does not matter",
+        "one quadratic for all speeds: Reynolds and Mach number are averaged over the table",
+    )
 
     def write(self, job: Job) -> Files:
         """Parameter lines as airframe scripts take them: one file for the simulator, one for the vehicle."""
@@ -69,23 +80,9 @@ class Px4Export(LoadsExport):
             f"{name}_vehicle.params": "\n".join([*vehicle, *allocation]) + "\n",
         }
 
-    def notes(self, job: Job) -> list[str]:
-        """Ranges and what u means."""
-        return [
-            "PX4 admits CT2 and CP2 up to 0 only: where the best quadratic bends upwards, a straight line is written",
-            "two files: thrust in the SIH is linear in u, so THR_MDL_FAC is 0; the vehicle gets the rotor's curve",
-            "u of the vehicle's THR_MDL_FAC is the share of full speed (an ESC that controls speed); for an ESC that "
-            "controls duty fit it to a bench map (`map`)",
-            "the sign of KM is for a rotor that turns as the case says; PX4 counts ccw from above as positive. The SIH "
-            "fixes the directions of its own rotors and takes no direction for the forward propeller",
-            f"CA_ROTOR0_CT is written up to the {MOST_CT:g} that PX4 takes; the allocation is normalised, so with "
-            "equal rotors the value does not matter",
-            "one quadratic for all speeds: Reynolds and Mach number are averaged over the table",
-        ]
-
     def loads(self, files: Files, rpm: Array, airspeed_m_s: Array) -> tuple[Array, Array]:
         """Forward propeller of the SIH at the density of the table."""
-        text = str(next(t for n, t in files.items() if n.endswith("_sih.params")))
+        text = written(files, "_sih.params")
         p = parameters(text)
         rho = float(text.split("density ")[1].split()[0])
         n, D = rpm / 60.0, p["SIH_F_DIA_INCH"] * INCH
@@ -137,6 +134,13 @@ class ArdupilotExport(LoadsExport):
     features = frozenset({"airspeed", "density", "rest"})
     conventions = "command c is taken as the share of full speed; disc_area of all rotors in m2"
     source = "ArduPilot SIM_Motor.cpp calc_thrust, SIM_Frame.cpp init (effective area from hover power)"
+    told = (
+        "the frame is a stand-in with four rotors and thrust-to-weight 2; the battery drain in SITL is not that "
+        "of the propeller",
+        "MOT_THST_EXPO is for a command that is the share of full speed; ESCs that control duty need less: see `map`",
+        "no torque and no rpm in this model class; yaw comes from the frame's motor table, whose order says which "
+        "motor turns how: a right-handed rotor turns counter-clockwise seen from above",
+    )
 
     def write(self, job: Job) -> Files:
         """Frame JSON and parameter lines."""
@@ -163,20 +167,9 @@ class ArdupilotExport(LoadsExport):
         body = json.dumps({k: float(f"{v:.9g}") if isinstance(v, float) else v for k, v in frame.items()}, indent=1)
         return {f"{name}.json": "\n".join(lines) + "\n" + body + "\n", f"{name}.parm": f"MOT_THST_EXPO,{e:.6g}\n"}
 
-    def notes(self, job: Job) -> list[str]:
-        """What the frame file stands on."""
-        return [
-            "the frame is a stand-in with four rotors and thrust-to-weight 2; the battery drain in SITL is not that "
-            "of the propeller",
-            "MOT_THST_EXPO is for a command that is the share of full speed; ESCs that control duty need less: see "
-            "`map`",
-            "no torque and no rpm in this model class; yaw comes from the frame's motor table, whose order says which "
-            "motor turns how: a right-handed rotor turns counter-clockwise seen from above",
-        ]
-
     def loads(self, files: Files, rpm: Array, airspeed_m_s: Array) -> tuple[Array, Array]:
         """One motor as SIM_Frame sets it up, c = rpm over the greatest rpm of the table; no torque."""
-        text = str(next(t for n, t in files.items() if n.endswith(".json")))
+        text = written(files, ".json")
         f = json.loads("\n".join(line for line in text.splitlines() if not line.startswith("#")))
         rho = float(text.split("density ")[1].split()[0])
         top = float(text.split(" to ")[1].split()[0])

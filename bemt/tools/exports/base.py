@@ -205,8 +205,9 @@ class Export(ABC):
     torque of a simulator), ``disk`` (a flow solver) or ``blade`` (a design tool); ``holds``: the model class, as a
     formula where there is one; ``features``: keys of :data:`FEATURES`; ``conventions``: signs, axes and units of the
     written numbers; ``source`` of format and formula; ``needs``: Python packages beyond the installation; ``options``:
-    the options that it declares beside the operating point; ``uses``: which of them it reads; ``turn``: 0 has a folder
-    of its own, 1 stands beside others, 2 makes the folder itself a case and comes last.
+    the options that it declares beside the operating point; ``uses``: which of them it reads; ``told``: what it tells
+    the user of every case; ``turn``: 0 has a folder of its own, 1 stands beside others, 2 makes the folder itself a case
+    and comes last.
     """
 
     id: ClassVar[str]
@@ -219,6 +220,7 @@ class Export(ABC):
     needs: ClassVar[tuple[str, ...]] = ()
     options: ClassVar[type[Table]] = PointTable
     uses: ClassVar[frozenset[str]] = frozenset()
+    told: ClassVar[tuple[str, ...]] = ()
     turn: ClassVar[int] = 0
 
     def put(self, job: Job, out: Path) -> Manifest:
@@ -274,7 +276,7 @@ class Export(ABC):
 
     def notes(self, job: Job) -> list[str]:
         """Sentences for the user of the files."""
-        return []
+        return list(self.told)
 
     def checked(self, job: Job, files: Files) -> Manifest:
         """``fit_error_pct``, ``band`` and ``range`` of what :meth:`write` gave, for the manifest."""
@@ -396,6 +398,11 @@ class DiskExport(Export):
             got, hint = f"an airspeed of {job.airspeed:g} m/s", f"{self.holds}; give --airspeed-m-s"
             out.append(Fault(job.file, f"--format {self.id}", got, "a speed above 0", hint))
         return out
+
+    def notes(self, job: Job) -> list[str]:
+        """Sentences for the user of the files; a prescribed load leaves out the duct."""
+        duct = "the load is the rotor's alone: duct and stator belong into your mesh"
+        return [*self.told, *([duct] if job.case.ducted and "sections" not in self.features else [])]
 
     def checked(self, job: Job, files: Files) -> Manifest:
         """Loads of the point, and what the written numbers integrate to."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -19,7 +19,34 @@ if TYPE_CHECKING:
     from bemt.rotors.case import Case
 
 
-class XrotorExport(BladeExport):
+class SectionExport(BladeExport):
+    """A target whose sections are fits of few numbers."""
+
+    most: ClassVar[int] = MOST_STATIONS
+
+    def fitted(self, job: Job) -> list[tuple[float, Any]]:
+        """r/R and section of each anchor at the Reynolds number of the operating point; XROTOR's and DFDC's."""
+        return [(x, fit_xrotor(polar, Re)) for x, polar, Re in anchors_of(job)]
+
+    def sections(self, job: Job) -> list[Any]:
+        """Fitted at the Reynolds number of the operating point."""
+        return [s for _, s in self.fitted(job)]
+
+    def notes(self, job: Job) -> list[str]:
+        """What a fit of sections leaves out."""
+        errors = section_errors(job, self.sections(job))
+        worst = ", ".join(f"r/R {e['r_over_R']:.2f}: cl {e['cl']:.3f}, cd {e['cd_pct']:.0f} %" for e in errors)
+        thin = stations(job, self.most)[3]
+        return [
+            f"sections are fits at the Reynolds numbers of the operating point; worst between the stalls: {worst}",
+            "mcrit 0.8 and the pitching moment 0 are not from the case; what is read back gets this project's own "
+            "effects",
+            *([f"{self.most} stations instead of {job.case.rotor().blade.r.size}"] if thin else []),
+            *self.told,
+        ]
+
+
+class XrotorExport(SectionExport):
     """File for XROTOR's LOAD."""
 
     id = "xrotor"
@@ -28,6 +55,7 @@ class XrotorExport(BladeExport):
     features = frozenset({"torque", "airspeed", "windmill", "reynolds", "mach", "density", "sections"})
     conventions = "r/R, c/R, beta in degrees from the plane of rotation; Adv = V/(Omega R); SI"
     source = "XROTOR 7.55 xio.f LOAD (read), xaero.f CLCDCM (section)"
+    told = ("tip loss, swirl and wake are XROTOR's own; stall delay and cascade are not in the file",)
 
     def write(self, job: Job) -> Files:
         """The rotor at the operating point; at rest XROTOR gets a small speed."""
@@ -44,7 +72,7 @@ class XrotorExport(BladeExport):
             f" {p.R:.10g} {V:.10g} {V / (p.omega * p.R):.10g} 0.0",
         ]
         rows += ["!         XI0          XIW", f" {p.Rhub / p.R:.10g} {p.Rhub / p.R:.10g}", "!  Naero"]
-        found = sections_of(job)
+        found = self.fitted(job)
         rows += [f" {len(found)}", *(line for x, s in found for line in section_lines(x, s))]
         rows += [
             "!LVDuct  LDuct   LWind", "  T       F       F", "!   II Nblds", f" {r.size} {p.blades}",
@@ -54,26 +82,10 @@ class XrotorExport(BladeExport):
         rows += ["!      URDuct", " 1.0"]
         return {f"{plain_name(job.case.name)}.xrotor": "\n".join(rows) + "\n"}
 
-    def sections(self, job: Job) -> list[Any]:
-        """Fitted at the Reynolds number of the operating point."""
-        return [s for _, s in sections_of(job)]
-
     def notes(self, job: Job) -> list[str]:
-        """How well the sections hold."""
-        return [
-            *section_notes(job, section_errors(job, self.sections(job))),
-            "tip loss, swirl and wake are XROTOR's own; stall delay and cascade are not in the file",
-            *(
-                ["static: Vel is 1 % of the tip speed, because XROTOR has no static case"]
-                if job.airspeed <= 0.0
-                else []
-            ),
-        ]
-
-
-def sections_of(job: Job) -> list[tuple[float, XrotorSection]]:
-    """Sections fitted at the anchors of the case, at the Reynolds number of the operating point."""
-    return [(x, fit_xrotor(polar, Re)) for x, polar, Re in anchors_of(job)]
+        """What every such file leaves out, and how a point at rest stands in it."""
+        static = "static: Vel is 1 % of the tip speed, because XROTOR has no static case"
+        return [*super().notes(job), *([static] if job.airspeed <= 0.0 else [])]
 
 
 def section_lines(x: float, s: XrotorSection) -> list[str]:
@@ -92,23 +104,12 @@ def section_lines(x: float, s: XrotorSection) -> list[str]:
     ]
 
 
-def section_notes(job: Job, errors: list[dict[str, float]], most: int = MOST_STATIONS) -> list[str]:
-    """What a fit of sections leaves out."""
-    thin = stations(job, most)[3]
-    worst = ", ".join(f"r/R {e['r_over_R']:.2f}: cl {e['cl']:.3f}, cd {e['cd_pct']:.0f} %" for e in errors)
-    return [
-        f"sections are fits at the Reynolds numbers of the operating point; worst between the stalls: {worst}",
-        "mcrit 0.8 and the pitching moment 0 are not from the case; what is read back gets this project's own effects",
-        *([f"{most} stations instead of {job.case.rotor().blade.r.size}"] if thin else []),
-    ]
-
-
 # QPROP: a propeller file.
 
 Anchors = list[tuple[float, QpropSection]]
 
 
-class QpropExport(BladeExport):
+class QpropExport(SectionExport):
     """Propeller file: eight lines of head, then stations with a section each."""
 
     id = "qprop"
@@ -117,12 +118,16 @@ class QpropExport(BladeExport):
     features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest", "sections"})
     conventions = "metres and degrees (factors 1), R on the second line in metres; slope per radian"
     source = "QPROP 1.22 qprop.f (read), gvcalc.f, tqcalc.f (loads), cdfun.f (drag)"
+    told = (
+        "QPROP has no hub radius: the blade begins at the first station",
+        "wake and tip loss are QPROP's own",
+    )
 
     def write(self, job: Job) -> Files:
         """The file; sections between anchors are interpolated in their numbers."""
         p = job.loading
         r, c, b, _ = stations(job)
-        found = _sections(job)
+        found = self.fitted(job)
         first = found[0][1]
         rows = [
             f"{job.case.name}, {job.rotation}, bemt {__version__}", "", f" {p.blades} {p.R:.10g}  ! Nblades [ R ]",
@@ -142,28 +147,15 @@ class QpropExport(BladeExport):
             rows.append(row)
         return {f"{plain_name(job.case.name)}.qprop": "\n".join(rows) + "\n"}
 
-    def sections(self, job: Job) -> list[Any]:
-        """Fitted at the Reynolds number of the operating point."""
-        return [s for _, s in _sections(job)]
-
-    def notes(self, job: Job) -> list[str]:
-        """How well the sections hold."""
-        return [
-            *section_notes(job, section_errors(job, self.sections(job))),
-            "QPROP has no hub radius: the blade begins at the first station",
-            "wake and tip loss are QPROP's own",
-        ]
-
-
-def _sections(job: Job) -> Anchors:
-    """Sections with one reference Reynolds number: QPROP takes that of the first station for all (tqcalc.f, CDFUN)."""
-    found = [(x, fit_qprop(polar, Re)) for x, polar, Re in anchors_of(job)]
-    common = found[0][1].reref
-    out = []
-    for x, s in found:
-        scale = (common / s.reref) ** s.reexp
-        out.append((x, replace(s, cd0=s.cd0 * scale, cd2u=s.cd2u * scale, cd2l=s.cd2l * scale, reref=common)))
-    return out
+    def fitted(self, job: Job) -> Anchors:
+        """Sections with one reference Reynolds number: QPROP takes that of the first station for all (its CDFUN)."""
+        found = [(x, fit_qprop(polar, Re)) for x, polar, Re in anchors_of(job)]
+        common = found[0][1].reref
+        out = []
+        for x, s in found:
+            scale = (common / s.reref) ** s.reexp
+            out.append((x, replace(s, cd0=s.cd0 * scale, cd2u=s.cd2u * scale, cd2l=s.cd2l * scale, reref=common)))
+        return out
 
 
 def _between(found: Anchors, x: float) -> list[float]:
@@ -180,7 +172,7 @@ DFDC_STATIONS = 30
 """IRX of DFDC.INC; a file with more is read and gives NaN."""
 
 
-class DfdcExport(BladeExport):
+class DfdcExport(SectionExport):
     """Case file for DFDC's LOAD."""
 
     id = "dfdc"
@@ -189,6 +181,12 @@ class DfdcExport(BladeExport):
     features = frozenset({"torque", "airspeed", "reynolds", "mach", "density", "rest", "duct", "sections"})
     conventions = "metres, x downstream from the lip, beta in degrees from the plane of rotation, RPM in rev/min"
     source = "DFDC 0.70 documentation (dfdc_doc.txt), sample cases, DFDC.INC (IRX = 30)"
+    told = (
+        "the stator and its recovery of swirl are left out",
+        "the centre body is a cylinder of the hub's radius with an elliptic nose: not from the case",
+        "the tip gap is left out: the wall is drawn in to the blade tip",
+    )
+    most = DFDC_STATIONS
 
     def faults(self, job: Job) -> list[Fault]:
         """Refuse a rotor without walls."""
@@ -203,9 +201,9 @@ class DfdcExport(BladeExport):
         """OPER, AERO, ROTOR and GEOM."""
         p, rotor, duct = job.loading, job.case.rotor(), self.compared(job).duct()
         assert duct is not None and duct.rotor_x is not None
-        r, c, b, _ = stations(job, DFDC_STATIONS)
+        r, c, b, _ = stations(job, self.most)
         x = duct.rotor_x
-        found = sections_of(job)
+        found = self.fitted(job)
         V_ref = max(p.airspeed_m_s, 0.2 * p.omega * p.R)
         rows = [
             "DFDC Version  0.70",
@@ -250,19 +248,6 @@ class DfdcExport(BladeExport):
         if duct is not None and duct.tip_gap_mm is not None:
             gone["duct.tip_gap_mm"] = 0.0
         return job.case.replaced(gone) if gone else job.case
-
-    def sections(self, job: Job) -> list[Any]:
-        """As XROTOR's."""
-        return [s for _, s in sections_of(job)]
-
-    def notes(self, job: Job) -> list[str]:
-        """What DFDC does not hold of the case."""
-        return [
-            *section_notes(job, section_errors(job, self.sections(job)), DFDC_STATIONS),
-            "the stator and its recovery of swirl are left out",
-            "the centre body is a cylinder of the hub's radius with an elliptic nose: not from the case",
-            "the tip gap is left out: the wall is drawn in to the blade tip",
-        ]
 
 
 def _body(Rhub: float, x: float, end: float) -> Array:

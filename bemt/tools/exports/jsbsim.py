@@ -12,7 +12,7 @@ import numpy as np
 from bemt.base import plugins
 from bemt.base.arrays import Array
 from bemt.tools.exports.base import Files, Job, LoadsExport
-from bemt.tools.exports.parts import COEFFICIENTS, header, hub_loads, inertia_estimate, plain_name, still_hub
+from bemt.tools.exports.parts import COEFFICIENTS, header, hub_loads, inertia_estimate, plain_name, still_hub, written
 from bemt.tools.exports.performance import table_loads
 
 # The motor that turns the rotor of an exported model: that of the case's drive, else one as large as the rotor needs.
@@ -213,7 +213,7 @@ class JsbsimExport(LoadsExport):
 
     def loads(self, files: Files, rpm: Array, airspeed_m_s: Array) -> tuple[Array, Array]:
         """Tables of the propeller file, bilinear, at the density that the head states."""
-        text = str(next(t for name, t in files.items() if name.endswith("_propeller.xml")))
+        text = written(files, "_propeller.xml")
         root = ET.fromstring(text)
         tables = {}
         for node in root.iter("table"):
@@ -228,9 +228,9 @@ class JsbsimExport(LoadsExport):
 
     def hub_loads(self, files: Files, rpm: Array, airspeed_m_s: Array, side_m_s: Array) -> Array:
         """Tables of the propeller and the system file, at the density that the head states."""
-        text = str(next(t for name, t in files.items() if name.endswith("_propeller.xml")))
+        text = written(files, "_propeller.xml")
         rho, D = float(text.split("density ")[1].split()[0]), float(ET.fromstring(text).findtext("diameter") or "nan")
-        root = ET.fromstring(str(next(t for name, t in files.items() if name.endswith("_speed.xml"))))
+        root = ET.fromstring(written(files, "_speed.xml"))
         doc: dict[str, Any] = {}
         for node in root.iter("table"):
             blocks = node.findall("tableData")

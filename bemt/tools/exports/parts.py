@@ -152,6 +152,11 @@ def plain_name(name: str) -> str:
     return f"p_{word}" if not word or word[0].isdigit() else word
 
 
+def written(files: Files, end: str) -> str:
+    """Text of the file whose name ends so."""
+    return str(next(data for name, data in files.items() if name.endswith(end)))
+
+
 def header(job: Job, title: str) -> list[str]:
     """Lines for the head of a text file."""
     table = job.performance

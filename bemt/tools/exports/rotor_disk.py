@@ -52,6 +52,11 @@ class RotorDiskExport(DiskExport):
         "blade rows (profile (r deg chord)); the solver prints lift = thrust/rho, its drag is no torque"
     )
     source = "OpenFOAM 1912 rotorDiskSource (calculate): f = q c B A/(2 pi r), force (0, -f Cd, f Cl)"
+    told = (
+        "cl and cd are loads over q, not section data: they hold at this rpm, airspeed and density alone",
+        "in a mesh of your own: topoSetDict makes the zone; no cell centre on the axis; only cells with a face on the "
+        "zone's +axis side are loaded; tipEffect stays above 1",
+    )
 
     def write(self, job: Job) -> Files:
         """Whole case: ``./Allrun`` makes the mesh and runs."""
@@ -80,16 +85,8 @@ class RotorDiskExport(DiskExport):
 
     def notes(self, job: Job) -> list[str]:
         """What rotorDisk does and does not."""
-        out = [
-            "cl and cd are loads over q, not section data: they hold at this rpm, airspeed and density alone",
-            "in a mesh of your own: topoSetDict makes the zone; no cell centre on the axis; only cells with a face on "
-            "the zone's +axis side are loaded; tipEffect stays above 1",
-        ]
-        if job.loading.sense < 0:
-            out.append("left-handed rotor: rpm is positive and cd negative, which turns the torque round")
-        if job.case.ducted:
-            out.append("the load is the rotor's alone: duct and stator belong into your mesh")
-        return out
+        left = "left-handed rotor: rpm is positive and cd negative, which turns the torque round"
+        return [*super().notes(job), *([left] if job.loading.sense < 0 else [])]
 
     def totals(self, job: Job, files: Files) -> tuple[float | None, float | None]:
         """Integrals of the written tables from hub to tip."""

@@ -13,12 +13,11 @@ from bemt.tools.exports.parts import (
     header,
     inertia_estimate,
     plain_name,
-    run_hub,
-    run_module,
     slope,
     static_fit,
     table_module,
 )
+from bemt.tools.exports.tables import ModuleExport
 
 
 class GazeboExport(LoadsExport):
@@ -33,6 +32,17 @@ class GazeboExport(LoadsExport):
     features = frozenset({"torque", "rest", "rotation", "hub"})
     conventions = "motorConstant in N/(rad/s)^2, momentConstant Q/T in m; turningDirection ccw seen from above"
     source = "gz-sim MulticopterMotorModel.cc; rotors_simulator gazebo_motor_model.cpp"
+    told = (
+        "base, rotor link and joint are a stand: the plugin is what goes into your vehicle",
+        "the constants hold at rest; thrust does not fall with airspeed here: see fit_error_pct.thrust.flight",
+        "rotorDragCoefficient and rollingMomentCoefficient are fitted in edgewise flow up to the airspeed of zero "
+        "thrust; pitch moment, side force and the gain of thrust across the shaft are not in this model",
+        "the plugin's rolling moment does not know the direction of rotation: the sign of its coefficient is that "
+        "of this rotor, negative for a left-handed one; on a vehicle whose rotors turn both ways it cancels",
+        "a right-handed propeller turns clockwise seen from behind, which is from below on a multicopter: ccw from "
+        "above; check turningDirection with the axis of your joint",
+        "the plugin of PX4's gazebo-classic also fades thrust with airspeed by a rule of its own (1 - V/25)",
+    )
 
     def write(self, job: Job) -> Files:
         """SDF model of a stand whose plugin is fitted at rest."""
@@ -71,20 +81,6 @@ class GazeboExport(LoadsExport):
 </sdf>
 """
         return {f"{name}_motor.sdf": text}
-
-    def notes(self, job: Job) -> list[str]:
-        """What this model class leaves out."""
-        return [
-            "base, rotor link and joint are a stand: the plugin is what goes into your vehicle",
-            "the constants hold at rest; thrust does not fall with airspeed here: see fit_error_pct.thrust.flight",
-            "rotorDragCoefficient and rollingMomentCoefficient are fitted in edgewise flow up to the airspeed of zero "
-            "thrust; pitch moment, side force and the gain of thrust across the shaft are not in this model",
-            "the plugin's rolling moment does not know the direction of rotation: the sign of its coefficient is that "
-            "of this rotor, negative for a left-handed one; on a vehicle whose rotors turn both ways it cancels",
-            "a right-handed propeller turns clockwise seen from behind, which is from below on a multicopter: ccw from "
-            "above; check turningDirection with the axis of your joint",
-            "the plugin of PX4's gazebo-classic also fades thrust with airspeed by a rule of its own (1 - V/25)",
-        ]
 
     def loads(self, files: Files, rpm: Array, airspeed_m_s: Array) -> tuple[Array, Array]:
         """Motor model at speed W, whatever the airspeed."""
@@ -254,7 +250,7 @@ class Propeller:
 '''
 
 
-class MujocoExport(LoadsExport):
+class MujocoExport(ModuleExport):
     """MJCF of one propeller and the Python file that looks its tables up."""
 
     id = "mujoco"
@@ -269,6 +265,11 @@ class MujocoExport(LoadsExport):
         "y; gear 1, so data.ctrl is in N and N m; a plain site motor with a torque gear would hold Q proportional to T"
     )
     source = "MuJoCo documentation, XML reference: actuator/general with site transmission, gear"
+    told = (
+        "the body of 1 kg is a stand: move site and actuators into your model",
+        "density is that of the table unless option/density of the model or the call says otherwise; a density in "
+        "the model also switches on MuJoCo's own drag of bodies",
+    )
 
     def write(self, job: Job) -> Files:
         """MJCF and callback."""
@@ -302,19 +303,3 @@ class MujocoExport(LoadsExport):
 """
         code = table_module(job, "MuJoCo propeller") + _CALLBACK.format(name=name)
         return {f"{name}.xml": mjcf, f"{name}_mujoco.py": code}
-
-    def notes(self, job: Job) -> list[str]:
-        """What stands in, and how density is chosen."""
-        return [
-            "the body of 1 kg is a stand: move site and actuators into your model",
-            "density is that of the table unless option/density of the model or the call says otherwise; a density in "
-            "the model also switches on MuJoCo's own drag of bodies",
-        ]
-
-    def loads(self, files: Files, rpm: Array, airspeed_m_s: Array) -> tuple[Array, Array]:
-        """The written Python, run."""
-        return run_module(str(next(t for n, t in files.items() if n.endswith("_mujoco.py"))), rpm, airspeed_m_s)
-
-    def hub_loads(self, files: Files, rpm: Array, airspeed_m_s: Array, side_m_s: Array) -> Array:
-        """The written Python, run."""
-        return run_hub(str(next(t for n, t in files.items() if n.endswith("_mujoco.py"))), rpm, airspeed_m_s, side_m_s)

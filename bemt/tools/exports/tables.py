@@ -24,6 +24,7 @@ from bemt.tools.exports.parts import (
     table_document,
     table_module,
     table_of_document,
+    written,
 )
 
 _LOOKUP = """
@@ -128,12 +129,11 @@ class TableExport(LoadsExport):
 
     def loads(self, files: Files, rpm: Array, airspeed_m_s: Array) -> tuple[Array, Array]:
         """The JSON, bilinear."""
-        text = str(next(t for n, t in files.items() if n.endswith(".json")))
-        return table_of_document(json.loads(text), rpm, airspeed_m_s)
+        return table_of_document(json.loads(written(files, ".json")), rpm, airspeed_m_s)
 
     def hub_loads(self, files: Files, rpm: Array, airspeed_m_s: Array, side_m_s: Array) -> Array:
         """The JSON, linear in each axis."""
-        doc = json.loads(str(next(t for n, t in files.items() if n.endswith(".json"))))
+        doc = json.loads(written(files, ".json"))
         found = hub_loads(doc["hub"], doc["density_kg_m3"], doc["diameter_m"], rpm, airspeed_m_s, side_m_s)
         found[:2] += table_of_document(doc, rpm, airspeed_m_s)
         return found
@@ -182,6 +182,23 @@ def _c_header(job: Job, p: str) -> str:
     lines.append(f"static const double {p}_hub{sizes} = {{\n {blocks}}};")
     lines.insert(lines.index(f"#define {P}_TABLE_H") + 1, "#include <math.h>")
     return "\n".join(lines) + (_LOOKUP + _WRENCH).format(p=p, P=P) + f"#endif /* {P}_TABLE_H */\n"
+
+
+class ModuleExport(LoadsExport):
+    """A target that looks the tables up in Python: the lookup in its one ``.py`` is what is checked."""
+
+    def loads(self, files: Files, rpm: Array, airspeed_m_s: Array) -> tuple[Array, Array]:
+        """The written Python, run."""
+        return run_module(_lookup(files), rpm, airspeed_m_s)
+
+    def hub_loads(self, files: Files, rpm: Array, airspeed_m_s: Array, side_m_s: Array) -> Array:
+        """The written Python, run."""
+        return run_hub(_lookup(files), rpm, airspeed_m_s, side_m_s)
+
+
+def _lookup(files: Files) -> str:
+    """Python of the tables without what other packages build on it."""
+    return written(files, ".py").split("\nfrom xml")[0]
 
 
 # FMU: the table as a co-simulation unit (FMI 2.0).
@@ -257,7 +274,7 @@ class {name}(Fmi2Slave):
 '''
 
 
-class FmuExport(LoadsExport):
+class FmuExport(ModuleExport):
     """A functional mock-up unit by pythonfmu."""
 
     id = "fmu"
@@ -270,6 +287,7 @@ class FmuExport(LoadsExport):
     )
     source = "pythonfmu 0.7; the machine that runs the FMU needs Python with pythonfmu"
     needs = ("pythonfmu",)
+    told = ("the FMU holds Python code: where it runs, Python and pythonfmu must be installed",)
 
     def write(self, job: Job) -> Files:
         """The FMU and its source."""
@@ -288,17 +306,3 @@ class FmuExport(LoadsExport):
                 f"{name}_fmu.py": text,
                 f"{name}_fmu.json": json.dumps(table_document(job)) + "\n",
             }
-
-    def notes(self, job: Job) -> list[str]:
-        """What the unit needs."""
-        return ["the FMU holds Python code: where it runs, Python and pythonfmu must be installed"]
-
-    def loads(self, files: Files, rpm: Array, airspeed_m_s: Array) -> tuple[Array, Array]:
-        """The lookup in the unit's source."""
-        text = str(next(t for n, t in files.items() if n.endswith("_fmu.py")))
-        return run_module(text.split("\nfrom xml")[0], rpm, airspeed_m_s)
-
-    def hub_loads(self, files: Files, rpm: Array, airspeed_m_s: Array, side_m_s: Array) -> Array:
-        """The lookup in the unit's source."""
-        text = str(next(t for n, t in files.items() if n.endswith("_fmu.py")))
-        return run_hub(text.split("\nfrom xml")[0], rpm, airspeed_m_s, side_m_s)

@@ -248,18 +248,19 @@ class Run:
     sideslip_deg: float = 0.0
     # ``incompressible`` or ``compressible``; None decides by the helical tip Mach number, compressible above 0.5
     solver: str | None = None
-    gas: str = "isentropic"  # As in :class:`bemt.tools.cfd.openfoam.settings.Settings`
-    sector: str | None = None  # As there; `sector` None is the smallest that fits
-    domain: str = "free"  # As there; `sector` None is the smallest that fits
-    turbulence: str = "kOmegaSST"  # As there; `sector` None is the smallest that fits
-    level: float = 6.0  # As there; `sector` None is the smallest that fits
     # Where a round plate stands behind the rotor, and its radius [R]
     wall_distance_over_R: float | None = None
     plate_radius_over_R: float = 2.0
-    iterations: int = 400  # As there; `sector` None is the smallest that fits
-    average: int = 100  # As there; `sector` None is the smallest that fits
-    ranks: int = 2  # As there; `sector` None is the smallest that fits
-    zone: str = "grid"  # As there; `sector` None is the smallest that fits
+    sector: str | None = None  # None is the smallest that fits
+    # As in :class:`bemt.tools.cfd.openfoam.settings.Settings`
+    gas: str = Settings.gas
+    domain: str = Settings.domain
+    turbulence: str = Settings.turbulence
+    level: float = Settings.level
+    iterations: int = Settings.iterations
+    average: int = Settings.average
+    ranks: int = Settings.ranks
+    zone: str = Settings.zone
 
 
 def check_run(run: Run, file: str = "") -> list[Fault]:
