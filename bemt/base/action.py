@@ -252,9 +252,8 @@ def in_words_of_the_library(keys: dict[str, str] | None = None, file: str = "") 
 def _named(fault: Fault, keys: dict[str, str], file: str) -> Fault:
     if fault.file == file and fault.where in keys:
         fault = replace(fault, file="", where=keys[fault.where])
-    parts = {key: in_words(getattr(fault, key)) for key in ("expected", "hint")}
-    places = {key: re.sub(r"--[a-z][\w-]*", lambda m: _name(m[0]), getattr(fault, key)) for key in ("file", "where")}
-    return replace(fault, **places, **parts)
+    file, where = (re.sub(r"--[a-z][\w-]*", lambda m: _name(m[0]), words) for words in (fault.file, fault.where))
+    return replace(fault, file=file, where=where, expected=in_words(fault.expected), hint=in_words(fault.hint))
 
 
 def options_of(fault: Fault) -> Fault:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 __all__ = [
@@ -58,7 +58,7 @@ class Fault:
     got: str
     expected: str
     hint: str = ""
-    choices: tuple[str, ...] = ()
+    choices: tuple[str, ...] = field(default=(), kw_only=True)
 
     def __str__(self) -> str:
         head = "".join(f"{part}: " for part in (self.file, self.where) if part)

@@ -159,7 +159,7 @@ def _chosen(name: str, tables: Sequence[str], every: Sequence[str], what: str) -
     kind = what if what == "files" else f"{what} with a table of numbers"
     got = f"no {part!r} among the {what} {among}" if part else f"{len(found) or 'no'} {kind} ({among})"
     hint = f'Name it behind the file: "{file}#{(names or ["NAME"])[0]}"'
-    raise InputError(Fault(name, "", got, f"one of its {what}", hint, tuple(names)))
+    raise InputError(Fault(name, "", got, f"one of its {what}", hint, choices=tuple(names)))
 
 
 def _blocks(stream: IO[bytes]) -> Iterator[bytes]:

@@ -83,7 +83,7 @@ class Word(Documented):
     us: float | None = None
     row: Mapping[str, float] | None = None
     stopped: str | None = None
-    refused: tuple[Mapping[str, str], ...] | None = None
+    refused: tuple[Mapping[str, Any], ...] | None = None
 
 
 class Guard:

@@ -65,7 +65,7 @@ class Stand:
         self.began, self.stopped, self.us = time.monotonic(), "", limits.stop_us
         self.known: dict[float, float] = {}  # Speed by pulse width, as it was read
         self._rows: deque[tuple[float, float, Mapping[str, float]]] = deque(maxlen=2000)
-        self._refused: list[Mapping[str, str]] = []
+        self._refused: list[Mapping[str, Any]] = []
         self._new = threading.Condition()
         command = [sys.executable, "-m", "bemt.tools.stand.guard"]
         self.guard = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
