@@ -18,6 +18,7 @@ import sys
 import threading
 import time
 from collections.abc import Mapping
+from typing import Any
 
 from bemt.base.document import Documented
 from bemt.base.errors import InputError
