@@ -48,7 +48,6 @@ from bemt.physics.sections.polars import ALPHA_GRID, ExtrapolatedTable, Polar, f
 from geometry.laws import helix
 from geometry.rotor import Rotor
 
-STALL = np.radians(13.0)
 DEG = np.degrees(ALPHA_GRID)
 
 

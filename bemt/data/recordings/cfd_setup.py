@@ -27,7 +27,7 @@ CONDITIONS = (
 """What a CFD number depends on besides the physics; the grid first."""
 _GRID = ("grid_level", "cells")
 _ALIAS = {"level": "grid_level", "grid": "grid_level", "mesh": "grid_level", "grid level": "grid_level"}
-_LIKE_CELLS, _LIKE_SIZE = 0.02, 0.02
+_LIKE_CELLS = 0.02
 SETTLED = 0.01
 """Standard uncertainty of a settled load from point to point on one grid, share of it [1]."""
 GRID_FLOOR: Mapping[str, Mapping[str, float]] = {
