@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
+from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -323,12 +324,9 @@ def test_no_neighbour_no_effect_and_little_in_a_fast_wind() -> None:
 
 
 @pytest.mark.slow
-def test_measured_pairs_lie_in_the_band_of_their_label(project: Path, shared_data: Path) -> None:
+def test_measured_pairs_lie_in_the_band_of_their_label(script: Callable[[str], ModuleType], shared_data: Path) -> None:
     """Two propellers at six spacings, as measured (docs/coaxial.md)."""
-    spec = importlib.util.spec_from_file_location("docs_coaxial_spacing", project / "docs/coaxial_spacing.py")
-    assert spec is not None and spec.loader is not None
-    page = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(page)
+    page = script("coaxial_spacing")
     folder = shared_data / "contrasts" / "coax_spacing_15in_11in"
     for label, inches, rpm in (("15x5", 15, 5000.0), ("11x5", 11, 6000.0)):
         off, together = [], []

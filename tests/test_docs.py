@@ -7,7 +7,6 @@ import dataclasses
 import doctest
 import html
 import importlib
-import importlib.util
 import inspect
 import json
 import os
@@ -19,7 +18,7 @@ import struct
 import subprocess
 import sys
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from fnmatch import fnmatch
 from pathlib import Path
 from types import ModuleType
@@ -226,12 +225,9 @@ def test_the_commands_of_the_page_exist(project: Path, maker: ModuleType) -> Non
     assert maker.commands(page) == page, "run python docs/make.py"
 
 
-def test_the_picture_of_the_wings_is_today_s(project: Path) -> None:
+def test_the_picture_of_the_wings_is_today_s(project: Path, script: Callable[[str], ModuleType]) -> None:
     """Every wing with its purpose, every line between two; the numbers may wait for the next edition."""
-    spec = importlib.util.spec_from_file_location("wings", project / "docs" / "wings.py")
-    assert spec is not None and spec.loader is not None
-    wings = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(wings)
+    wings = script("wings")
     folders = {path.parent.name for path in (project / "bemt").glob("*/__init__.py")} | {"geometry"}
     assert folders == set(wings.ORDER)
     picture = (project / "docs" / "img" / "wings.svg").read_text(encoding="utf-8")
@@ -332,13 +328,9 @@ def test_the_python_of_the_documents_runs(project: Path, pages: Path, document: 
 
 
 @pytest.fixture
-def maker(project: Path) -> ModuleType:
+def maker(script: Callable[[str], ModuleType]) -> ModuleType:
     """The script docs/make.py."""
-    spec = importlib.util.spec_from_file_location("docs_make", project / "docs" / "make.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return script("make")
 
 
 def test_the_diagnosis_page_says_what_the_code_does(project: Path, maker: ModuleType) -> None:

@@ -50,7 +50,6 @@ from bemt.rotors.case.prepare import prepare_case
 from geometry.laws import helix
 from geometry.rotor import Rotor
 
-STALL = np.radians(13.0)
 DEG = np.degrees(ALPHA_GRID)
 
 

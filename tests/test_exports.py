@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import csv
 import hashlib
-import importlib.util
 import json
 import os
 import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -70,14 +70,7 @@ def written(word: str, job: Job) -> Files:
     return exports()[word].write(job)
 
 
-def script(project: Path, name: str) -> Any:
-    """One of the scripts of docs/."""
-    spec = importlib.util.spec_from_file_location(f"docs_{name}", project / f"docs/{name}.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # dataclasses look their module up
-    spec.loader.exec_module(module)
-    return module
+Script = Callable[[str], Any]
 
 
 def flown(project: Path, name: str) -> dict[str, float]:
@@ -283,9 +276,9 @@ READ = {"table": 1e-6, "jsbsim": 1e-3, "mujoco": 1e-9, "rotorpy": 1e-9, "fmu": 1
 
 
 @pytest.mark.parametrize("word", ["fmu", "flow360", "gazebo", "jsbsim", "mujoco", "rotorpy", "table"])
-def test_the_program_says_what_was_written_and_what_bemt_says(word: str, project: Path, job: Job) -> None:
+def test_the_program_says_what_was_written_and_what_bemt_says(word: str, script: Script, job: Job) -> None:
     """At the same operating points, right- and left-handed; tables from descent to the windmill."""
-    read_back = script(project, "read_back")
+    read_back = script("read_back")
     if not read_back.installed(word):
         pytest.skip(f"not installed: {' '.join(read_back.PROGRAMS[word].modules + read_back.PROGRAMS[word].tools)}")
     found = read_back.measured(word)
@@ -517,13 +510,13 @@ def test_a_fan_leaves_the_swirl_of_its_torque(job: Job, fan: Job, ducted: bool, 
 @pytest.mark.slow
 @pytest.mark.parametrize("speed", [0.0, 27.0933])
 @pytest.mark.parametrize("hand", ["right", "left"])
-def test_rotor_disk_in_openfoam(project: Path, tmp_path: Path, speed: float, hand: str) -> None:
+def test_rotor_disk_in_openfoam(project: Path, script: Script, tmp_path: Path, speed: float, hand: str) -> None:
     """The load on the cells of the disk, and which way it swirls the flow."""
     if shutil.which("simpleFoam") is None:
         pytest.skip("no OpenFOAM")
     case = load_case(project / "cases/prop_8x5/case.toml").replaced({"rotor.rotation": hand})
     job = Job(case, 20_000.0, speed)
-    ran = script(project, "simulators").rotor_disk(job, tmp_path)
+    ran = script("simulators").rotor_disk(job, tmp_path)
     assert ran.sense == (1 if hand == "right" else -1)
     assert ran.thrust_N[0] == pytest.approx(job.loading.thrust_N, rel=1e-3)
     assert ran.torque_Nm[0] == pytest.approx(job.loading.torque_Nm, rel=5e-3)
@@ -990,9 +983,9 @@ def test_a_manifest_removes_nothing_elsewhere(project: Path, tmp_path: Path, sch
         export_case(Job(case, solid=COARSE), out, ["stl"])
 
 
-def test_a_qprop_file_gives_its_loads_in_the_equations_of_qprop(project: Path) -> None:
+def test_a_qprop_file_gives_its_loads_in_the_equations_of_qprop(script: Script) -> None:
     """Not our reader: the swirl, stall and drag of QPROP itself; near in flight, within its straight lift at rest."""
-    for _, _, V, thrust, torque in script(project, "qprop_equations").compared():
+    for _, _, V, thrust, torque in script("qprop_equations").compared():
         assert abs(thrust) <= (10.0 if V == 0.0 else 7.0) and abs(torque) <= 6.0
 
 

@@ -32,17 +32,6 @@ def history(turns: float = 6.0, per_turn: int = 50, start: float = 0.0, first: i
     return text
 
 
-@pytest.fixture
-def put(tmp_path: Path) -> Callable[[str, str], Path]:
-    def write(name: str, text: str) -> Path:
-        path = tmp_path / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)
-        return path
-
-    return write
-
-
 def call(capsys: pytest.CaptureFixture[str], *args: object) -> tuple[int, dict[str, Any]]:
     code = main(["import", *map(str, args), "--json"])
     return code, json.loads(capsys.readouterr().out)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 import re
+from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -53,13 +54,11 @@ def test_the_readable_method_gives_the_kernel_s_loads(V: float, B: int) -> None:
     np.testing.assert_allclose(ours.W, kernel.radial.W[0], rtol=1e-6)
 
 
-def test_the_worked_element_of_the_theory_page_is_that_of_the_plain_method(project: Path) -> None:
+def test_the_worked_element_of_the_theory_page_is_that_of_the_plain_method(
+    project: Path, script: Callable[[str], ModuleType]
+) -> None:  # fmt: skip
     """Every number of the section follows from docs/element.py, to its digits."""
-    spec = importlib.util.spec_from_file_location("docs_element", project / "docs" / "element.py")
-    assert spec is not None and spec.loader is not None
-    element = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(element)
-    n = element.numbers()
+    n = script("element").numbers()
     page = (project / "docs" / "theory.md").read_text(encoding="utf-8")
     page = " ".join(page[page.index("**Worked number.**") : page.index("## The residual of one")].split())
     for pattern, value in {

@@ -18,7 +18,6 @@ from bemt.data.readers import cfd
 from bemt.data.recordings.load import import_file, import_files
 from bemt.physics.dataset import Dataset
 
-RNG = np.random.default_rng(20)
 N = 40
 
 

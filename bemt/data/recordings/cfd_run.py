@@ -414,9 +414,8 @@ def _dataset(work: OpenRun, points: _Points, read: Sequence[tuple[str, Dataset]]
         note = f"{number_of((~keep).sum(), 'point')} without a load left out"
         made = replace(made.select(keep), notes=(*made.notes, note))
         each = None if each is None else np.broadcast_to(each, (rows,))[keep]
-    found = (
-        () if work.elsewhere else check(made, ducted="duct_thrust_N" in full)
-    )  # what lies elsewhere is no slip of a unit
+    # what lies elsewhere is no slip of a unit
+    found = () if work.elsewhere else check(made, ducted="duct_thrust_N" in full)
     fluid = "" if "density_kg_m3" in full else "density, not stated and taken for that of air (--density-kg-m3), or "
     slips = (f"{f.evidence}. Suggestion: {fluid}{f.correction}" for f in found if f.severity != "note")
     made = replace(made, notes=(*slips, *made.notes))
