@@ -27,13 +27,9 @@ CONDITIONS = (
 """What a CFD number depends on besides the physics; the grid first."""
 _GRID = ("grid_level", "cells")
 _ALIAS = {"level": "grid_level", "grid": "grid_level", "mesh": "grid_level", "grid level": "grid_level"}
-<<<<<<< HEAD
-_LIKE_CELLS, _LIKE_SIZE = 0.02, 0.02
+_LIKE_CELLS = 0.02
 FLIES = 0.5
 """Airspeed above which a rotor is not at rest [m/s]."""
-=======
-_LIKE_CELLS = 0.02
->>>>>>> h-cut
 SETTLED = 0.01
 """Standard uncertainty of a settled load from point to point on one grid, share of it [1]."""
 GRID_FLOOR: Mapping[str, Mapping[str, float]] = {

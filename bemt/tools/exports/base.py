@@ -206,13 +206,8 @@ class Export(ABC):
     formula where there is one; ``features``: keys of :data:`FEATURES`; ``conventions``: signs, axes and units of the
     written numbers; ``source`` of format and formula; ``needs``: Python packages beyond the installation; ``options``:
     the options that it declares beside the operating point; ``uses``: which of them it reads; ``told``: what it tells
-<<<<<<< HEAD
-    of every case; ``turn``: 0 has a folder of its own, 1 stands beside others, 2 makes the folder itself a case
-    and comes last.
-=======
     the user of every case; ``turn``: 0 has a folder of its own, 1 stands beside others, 2 makes the folder itself a
     case and comes last.
->>>>>>> h-cut
     """
 
     id: ClassVar[str]
