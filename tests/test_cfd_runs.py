@@ -806,6 +806,9 @@ def test_a_rotor_that_brakes_in_flight_is_not_turned_into_one_that_pulls(put: Ca
     assert run["thrust_N"][0] == pytest.approx(-1.2, rel=1e-3) and not any("merit" in n for n in run.notes)
     with pytest.raises(InputError, match="--sign thrust=1 keeps it"):  # 2.4 W of 3.8 W: either may be
         run_of(["thrust.out", "torque.out"], {"rpm": 6000.0, "airspeed_m_s": 2.0}, **UNITS)
+    put("still.out", rfile("torque", steady(0.0), None))
+    with pytest.raises(InputError, match="--sign thrust=1 keeps it"):
+        run_of(["thrust.out", "still.out"], flight, **UNITS)
     put("thrust.out", rfile("thrust", steady(1.2), None))  # a pull takes power of the shaft
     run = run_of(["thrust.out", "torque.out"], {"rpm": 6000.0, "airspeed_m_s": 2.0}, **UNITS)
     assert run["torque_Nm"][0] == pytest.approx(0.006, rel=1e-3)

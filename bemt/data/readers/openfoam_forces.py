@@ -180,7 +180,7 @@ def _record(
     else:
         columns = [Column("time_s", "s", "time"), *columns[1:]]
     if any(c.unit in ("N", "Nm") for c in columns):
-        notes.append("newtons only if rhoInf was the density, if not --reference density=RHOINF --density-kg-m3 RHO")
+        notes.append("newtons only if rhoInf was the density; if not: --reference density=RHOINF --density-kg-m3 RHO")
         notes.append("of the patches of the function object: of one of N sectors, --sector N")
         for axis in "xyz":
             notes += _balance(columns, table, axis)

@@ -252,13 +252,12 @@ class OpenRun:
         In flight a rotor may brake, and the flow may drive it. What a pull or a flow can give of power, thrust times
         airspeed at most (actuator disk), tells which; what is open then is asked for.
         """
-        known = [k for k in ("airspeed_m_s", "rpm") if k in state]
-        V, rpm = (np.nan_to_num(state[k]) if k in known else np.zeros(1) for k in ("airspeed_m_s", "rpm"))
+        V, rpm = (np.nan_to_num(state.get(k, np.zeros(1))) for k in ("airspeed_m_s", "rpm"))
         slowest, flies = float(V.min()), float(V.min()) > FLIES
         middle = {q: _middle(f.values[V == slowest] if V.size == f.values.size else f.values) for q, f in loads.items()}
         shaft = max((abs(middle[q]) * (1.0 if q == "power" else float(np.median(rpm)) * math.pi / 30.0)
                      for q in ("torque", "power") if q in loads), default=math.inf)  # fmt: skip
-        brakes = slowest * abs(middle.get("thrust", 0.0)) > shaft  # no pull gives more than its shaft
+        brakes = 0.0 < shaft < slowest * abs(middle.get("thrust", 0.0))  # no pull gives more than its shaft
         out: dict[str, float] = {}
         for quantity, value in middle.items():
             told, name, sign = self.fact(quantity).sign, CHANNEL[quantity], -1.0 if value < 0 else 1.0
