@@ -49,6 +49,7 @@ class CoaxialNeighbour(Effect):
         "airspeed; gone when the other rotor stops"
     )
     check = "see whether a second rotor is on the axis; if so, repeat with it stopped"
+    check_minutes = 1.0
     parameters = (
         Parameter("z_over_R", "1", 0.1, 4.0, "coaxial stands, 0.1 to 1 diameters apart"),
         Parameter("load", "1", 0.0, 2.0, "declared; thrust of the neighbour over that of this rotor", 0, 0.0),

@@ -29,6 +29,7 @@ class TipCut(Effect):
     title = "blades shorter than stated"
     sign = "less thrust and even less torque at every speed; the advance ratio of zero thrust barely moves"
     check = "measure the diameter"
+    check_minutes = 2.0
     parameters = (Parameter("cut", "1", 0.0, 0.15, "declared, share of the radius", 4, 0.0),)
     on_by_default = False
 
