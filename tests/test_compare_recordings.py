@@ -711,3 +711,11 @@ def test_no_ratio_is_drawn_without_a_common_advance_ratio(monkeypatch: pytest.Mo
 def test_one_reading_is_a_level_without_a_warning() -> None:
     one = CoefficientCurve.of(np.array([0.05, np.nan]), np.zeros(2), np.array([6000.0, 7000.0]), (-0.3, -0.4, 0.2))
     assert one(np.zeros(1), np.array([6000.0]))[0] == pytest.approx(0.05, rel=1e-3)
+
+
+def test_the_quick_look_comes_first_and_nobody_is_asked_for_what_he_would_have_seen(tmp_path: Path) -> None:
+    answer = compare(*pair(tmp_path, scaled(thrust_N=0.85, torque_Nm=1.1), seed=3))
+    told, known = answer.document["next_measurement"]["text"], catalogue()
+    assert {"propeller", "section"} <= set(answer.effects)
+    assert told.startswith(known["propeller"].check) and known["section"].check not in told
+    assert known["coaxial_neighbour"].check not in told

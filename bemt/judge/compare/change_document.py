@@ -27,7 +27,7 @@ from bemt.judge.compare.recordings import (
 from bemt.judge.compare.selection import Invocation
 from bemt.judge.compare.smooth_change import Ratio
 from bemt.judge.explanation import Size
-from bemt.judge.loss import SPREAD
+from bemt.judge.loss import SPREAD, checks_by_worth, minutes
 from bemt.physics.effects import catalogue
 
 AIR_OF_BOTH = "--air-a TEMPERATURE,PRESSURE --air-b TEMPERATURE,PRESSURE"
@@ -46,6 +46,8 @@ _DAY, _SEEN = 0.12, 0.03
 _TOLD = (*AS_RECORDED, "voltage as recorded")
 # Scatter of readings at one speed, share, that no stand has: something else changes from reading to reading.
 _RESTLESS = 0.10
+_REPEAT = "repeat the run of A and compare it with A: so much two runs differ by without a cause"
+_STEPS = 2  # that are offered at once
 
 
 def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
@@ -92,13 +94,14 @@ def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
     if not _TORQUES & change.ratios.keys() and change.loads is said:
         text = "record torque in both runs: thrust alone cannot tell gain, air and blade apart"
         return {"text": text, "command": asked.command(a="A_WITH_TORQUE.csv", b="B_WITH_TORQUE.csv")}
-    if checks:
-        firsts = {FAMILY.get(k, k): check for k, check in reversed(checks.items())}
-        text = "; or ".join(reversed(firsts.values()))
-        return {"text": text, "command": with_case}
-    text = "repeat the run of A and compare it with A: so much two runs differ by without a cause"
     again = asked.command(b="A_AGAIN.csv", rows_b=asked.rows_a, air_b=asked.air_a)
-    return {"text": text, "command": again}
+    order = checks_by_worth(said.ranked, minutes("reference", len(change.a.points)))
+    firsts: dict[str, str] = {}
+    for cause in [*order, *checks]:  # the quickest of each family
+        if cause in checks or said.verdict != "class":
+            firsts.setdefault(FAMILY.get(cause, cause), _check(cause) if cause else _REPEAT)
+    told = [*firsts.values()][:_STEPS] or [_REPEAT]
+    return {"text": "; or ".join(told), "command": again if told[0] == _REPEAT else with_case}
 
 
 def _check(name: str) -> str:

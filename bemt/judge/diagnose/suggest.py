@@ -20,11 +20,11 @@ from bemt.judge.compare.change_document import AIR_OF_BOTH, DAYS
 from bemt.judge.diagnose import noise
 from bemt.judge.diagnose.assemble import assemble
 from bemt.judge.diagnose.form import ALIKE
-from bemt.judge.diagnose.nuisance import PRIORS
 from bemt.judge.diagnose.problem import Part, Problem
 from bemt.judge.diagnose.record import Record
 from bemt.judge.diagnose.repeats import conditions
 from bemt.judge.diagnose.signatures import actual_unit, effect_of
+from bemt.judge.loss import minutes
 from bemt.physics import effects
 from bemt.physics.air import R_DRY
 from bemt.physics.bem import model as bem
@@ -420,17 +420,14 @@ def _distances(plan: Problem, of: Sequence[effects.Effect | None], hyper: noise.
 
 
 def look(names: Sequence[str], record: Record) -> Suggestion | None:
-    """A check by hand that confirms the first explanation or rules out the second, whichever there is."""
-    for aim, name in zip(("confirm", "rule out"), names, strict=False):
-        if check := _check(name, record):
-            return Suggestion(f"to {aim} {name}, {check}", (), (), 0.0, 0.0, "look", checks=name,
-                              minutes=minutes("look", 0))  # fmt: skip
-    return None
-
-
-def minutes(kind: str, points: int) -> float:
-    """Time that a stand needs for a step [min]; declared, by experience with benches: a reference undoes the cause."""
-    return {"run": 4.0, "reference": 15.0, "look": 10.0}[kind] + 0.2 * points
+    """The quicker check by hand: that confirms the first explanation, or rules out the second."""
+    aims = [(check, aim, name) for aim, name in zip(("confirm", "rule out"), names, strict=False)
+            if (check := _check(name, record))]  # fmt: skip
+    if not aims:
+        return None
+    check, aim, name = min(aims, key=lambda one: effects.catalogue()[one[2]].check_minutes)
+    return Suggestion(f"to {aim} {name}, {check}", (), (), 0.0, 0.0, "look", checks=name,
+                      minutes=effects.catalogue()[name].check_minutes)  # fmt: skip
 
 
 def correction(names: Sequence[str], settings: Mapping[str, Mapping[str, Any]], record: Record) -> Suggestion | None:
@@ -466,9 +463,4 @@ def _check(name: str, record: Record) -> str:
     cls = effects.catalogue().get(name)
     if cls is not None and cls.check_in_room and np.all(record.V > 0.0):
         return ""
-    if cls is not None and cls.check:
-        return cls.check
-    if name in ("thrust_gain", "torque_gain", "thrust_zero", "torque_zero"):
-        share = PRIORS["thrust gain"]
-        return f"hang dead weights on the cells before and after a run: the gain is then known to {share / 4:.2%}"
-    return ""
+    return "" if cls is None else cls.check

@@ -29,7 +29,7 @@ from typing import Protocol
 import numpy as np
 
 from bemt.base.tables import json_text, write_atomic
-from bemt.judge.diagnose.suggest import minutes
+from bemt.judge.loss import minutes
 from bemt.judge.proof import prove, rows, score
 from bemt.judge.proof.causes import CAUSES, Rig
 from bemt.judge.proof.course import DONE, MODEL, Course, Loop, scored

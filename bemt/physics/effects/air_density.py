@@ -24,6 +24,7 @@ class AirDensity(Effect):
     exact = True
     title = "wrong air density"
     check = "read barometer and thermometer at the stand and compute the density"
+    check_minutes = 3.0
     sign = (
         "thrust and torque off by the same share at every speed and advance ratio; a cell gain moves only one of them"
     )

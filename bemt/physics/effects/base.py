@@ -432,8 +432,9 @@ class Effect:
     exact: ClassVar[bool] = False
     # Its share of torque is not known from that of thrust: codes and ducts differ in it, even in its sign.
     torque_open: ClassVar[bool] = False
-    # How to check it without a run.
+    # How to check it without a run, and the time that this takes at a stand, declared [min].
     check: ClassVar[str] = ""
+    check_minutes: ClassVar[float] = 10.0
     # Whether that check is one of a room: no tunnel can do it.
     check_in_room: ClassVar[bool] = False
     # Parameters with a few discrete values (such as a ratio of units).

@@ -51,6 +51,7 @@ class CoaxialNeighbour(Effect):
     check = "see whether a second rotor is on the axis; if so, repeat with it stopped"
     words = {"side": _SIDES}
     in_duct = "the rotor has a duct"
+    check_minutes = 1.0
     parameters = (
         Parameter("z_over_R", "1", 0.1, 4.0, "coaxial stands, 0.1 to 1 diameters apart"),
         Parameter("load", "1", 0.0, 2.0, "declared; thrust of the neighbour over that of this rotor", 0, 0.0),

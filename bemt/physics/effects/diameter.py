@@ -23,6 +23,7 @@ class Diameter(Effect):
     id = "diameter"
     title = "different diameter"
     check = "measure the diameter"
+    check_minutes = 2.0
     sign = "torque changes a little more than thrust, both at every speed; V/(n D) shifts"
     geometric = True
     parameters = (Parameter("change", "1", -0.4, 1.0, "declared; propellers that one motor turns", 9, 0.0, 0.1),)

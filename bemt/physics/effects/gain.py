@@ -23,6 +23,7 @@ class Gain(Effect):
     kind = "stand"
     fault = "gain"
     parameters = (Parameter("gain", "1", -0.4, 0.4, "declared, workshop calibration; seldom far more", 3, 0.0, 0.05),)
+    check = "hang dead weights on the cell before and after a run"
     on_by_default = False
 
     def reading(self, reading: Reading, flow: Flow) -> None:

@@ -40,6 +40,7 @@ class GroundEffect(Effect):
     inviscid = True
     title = "wall behind the propeller"
     check = "measure the distance to the nearest wall behind the propeller"
+    check_minutes = 2.0
     along = ("wall_distance_m",)
     sign = (
         "more thrust at the same speed and torque; fades with airspeed, unlike a cell gain, unless the wall also "

@@ -26,6 +26,7 @@ class MountedBackwards(Effect):
     id = "mounted_backwards"
     title = "propeller mounted backwards"
     check = "look at the propeller: the side with the label, and the rounded edges, lead"
+    check_minutes = 1.0
     sign = "half of the thrust is lost at every speed and torque at rest rises; no thrust from a lower airspeed on"
     parameters = (Parameter("drag", "1", 1.0, 3.0, "Critzos et al. 1955, declared for cambered sections", 3),)
     order = -10

@@ -24,6 +24,7 @@ class AnotherPropeller(Effect):
     id = "propeller"
     title = "another propeller"
     check = "measure the diameter; compare label, blade count and weight"
+    check_minutes = 2.0
     sign = "both loads change by large, different shares: pitch, blades, chord and section at once"
     parameters = (
         Parameter("thrust", "1", -0.8, 4.0, "declared; propellers that one motor turns", 3, 0.0, 0.4),

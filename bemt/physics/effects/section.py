@@ -30,6 +30,7 @@ class Section(Effect):
     check = (
         "copy the section at 0.75 R from the blade (a cast, or a cut through a broken one) and compare it with the case"
     )
+    check_minutes = 120.0
     sign = (
         "lift changes by a constant amount at every advance ratio and drag by one factor, at any speed; neither "
         "depends on Reynolds number, Mach number or time"

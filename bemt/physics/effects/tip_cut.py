@@ -30,6 +30,7 @@ class TipCut(Effect):
     sign = "less thrust and even less torque at every speed; the advance ratio of zero thrust barely moves"
     check = "measure the diameter"
     in_duct = "in a duct shorter blades are a wider tip gap"
+    check_minutes = 2.0
     parameters = (Parameter("cut", "1", 0.0, 0.15, "declared, share of the radius", 4, 0.0),)
     on_by_default = False
 

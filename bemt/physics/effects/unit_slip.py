@@ -49,6 +49,7 @@ class UnitSlip(Effect):
     id = "unit_slip"
     title = "wrong unit or sign"
     check = "check the unit in the settings of the stand and in the heading of the file"
+    check_minutes = 3.0
     sign = "one channel off by exactly the ratio of two units, or by -1, at every point; no physics gives such a factor"
     kind = "stand"
     fault = "unit"

@@ -28,6 +28,7 @@ class Untwist(Effect):
     geometric = True
     title = "elastic blade twist"
     check = "film the tip from the side, stopped and at full speed"
+    check_minutes = 30.0
     sign = (
         "thrust coefficient falls (or rises) with rho Omega^2 and not with Mach number: depends on density at the "
         "same speed, not on air temperature"

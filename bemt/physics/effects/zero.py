@@ -23,6 +23,7 @@ class Zero(Effect):
     kind = "stand"
     fault = "zero"
     parameters = (Parameter("zero", "1", -0.25, 0.25, "declared, of full scale; a weight not tared", 3, 0.0, 0.02),)
+    check = "hang dead weights on the cell before and after a run"
     on_by_default = False
 
     def reading(self, reading: Reading, flow: Flow) -> None:
