@@ -104,7 +104,7 @@ def page_and_browser(tmp_path_factory: pytest.TempPathFactory, project: Path) ->
 def tab(page_and_browser: tuple[str, str]) -> Iterator[Tab]:
     """The page as somebody who opens it sees it: a session of its own."""
     page, address = page_and_browser
-    with sync.connect(address, max_size=None) as ws:
+    with sync.connect(address, max_size=None, ping_interval=None) as ws:  # a busy browser answers late
         one = Tab(ws)
         one.call("Page.navigate", url=page)
         yield one

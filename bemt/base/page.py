@@ -50,10 +50,16 @@ class PageTable:
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]], sort: bool = True) -> PageTable | None:
-    """Make a table; None without rows."""
+    """Make a table; None without rows. A column that no row fills is left out.
+
+    >>> table(["cause", "target"], [["gap", ""]]).head
+    [('cause', False)]
+    """
     body = [[cell if isinstance(cell, Cell) else Cell(str(cell)) for cell in row] for row in rows]
     if not body:
         return None
+    used = [k for k in range(len(head)) if any(row[k].text for row in body)]
+    head, body = [head[k] for k in used], [[row[k] for k in used] for row in body]
     units = [re.sub(r"\[[^]]*\]", lambda unit: unit[0].replace(" ", "\u00a0"), words) for words in head]
     numbers = [any(row[k].number for row in body) for k in range(len(head))]
     return PageTable(list(zip(units, numbers, strict=True)), body, sort)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from bemt.base.page import Cell, PageTable, num, table
-from bemt.base.tables import number_text
+from bemt.base.tables import number_text, speed_text
 from bemt.results.report.book import Book, CasePage, Part, ShownAnswer, uri
 from bemt.results.report.diagnosis_block import (
     answer,
@@ -157,7 +157,7 @@ def _numbers(book: Book) -> list[str]:
     for page in book.cases:
         own, v = lead(page.result), {source: items[0][1] for source, items in _values(page).items()}
         others = [_n(v.get(source)) for source in ("k1k2", "cfd", "bench", "vendor")]
-        cells = [_n(own and own.thrust_N), _n(own and own.u, 2), *others, _n(own and own.rpm, 6)]
+        cells = [_n(own and own.thrust_N), _n(own and own.u, 2), *others, speed_text(own.rpm if own else None)]
         rows.append([plain_markdown(page.result.name, 80), *cells, plain_markdown(page_verdict(page)[1])])
     heads = ["case", "BEMT T [N]", "u [N]", "K1/K2 T [N]", *(f"{k} T [N]" for k in ("CFD", "bench", "vendor")),
              "rev/min", "verdict"]  # fmt: skip
@@ -165,8 +165,8 @@ def _numbers(book: Book) -> list[str]:
     used = [k for k in range(last + 1) if k in (0, last) or any(row[k] != "-" for row in rows)]
     if not any(0 < k < last - 1 for k in used):
         return [NO_NUMBER]
-    lines = [[row[k] for k in used] for row in (heads, ["---"] * len(heads), *rows)]
-    return [f"| {' | '.join(line)} |" for line in lines]
+    head, *lines = (f"| {' | '.join(row[k] for k in used)} |" for row in (heads, *rows))
+    return [head, "|" + "---|" * len(used), *lines]
 
 
 def summary(book: Book) -> str:
