@@ -326,12 +326,19 @@ def test_one_motor_and_esc_with_two_propellers(shared_data: Path, tmp_path: Path
 
 
 @pytest.mark.slow
-def test_real_thrust_maps_within_five_percent(shared_data: Path) -> None:
-    found = {m.name: m.worst for m in drive_recordings.maps(shared_data)}
-    for name in ("xNova steps (to 1600 us)", "xNova ramp (to 1800 us)", "MIT 10 in", "MIT 14 in"):
+def test_real_thrust_maps_within_five_percent(shared_data: Path, tmp_path: Path) -> None:
+    for folder in ("jmajew", "thrust_map"):
+        (tmp_path / folder).symlink_to((shared_data / folder).resolve())
+    found = {m.name: m.worst for m in drive_recordings.maps(tmp_path)}
+    for name in ("xNova steps (to 1600 us)", "xNova ramp (to 1800 us)"):
         assert found[name] < 0.05, name
     apart = [worst for name, worst in found.items() if name.startswith("jmajew")]
     assert len(apart) == 10 and max(apart) < 0.05
+
+
+def test_no_drive_without_a_solution_is_fitted(shared_data: Path) -> None:
+    points, torque = drive_recordings._read(shared_data / "rcbenchmark" / "StepsTest_2020-06-16_212137.csv")
+    assert np.isfinite(drive_identify.fit_map(points, None, torque).drive.steady(points.pulse_us).thrust_N).all()
 
 
 @pytest.mark.slow

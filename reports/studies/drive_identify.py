@@ -113,12 +113,11 @@ def fit_map(
 
         def misfit(x: Array) -> Array:
             got = built(dict(zip(names, map(float, np.exp(x)), strict=True))).steady(points.pulse_us)
-            parts = [
-                (got.thrust_N - v["thrust_N"]) / full["thrust_N"],
-                (got.rpm - v["rpm"]) / full["rpm"],
-                0.5 * (got.battery_A - v["current_A"]) / full["current_A"],
-            ]
-            return np.asarray(np.nan_to_num(np.concatenate(parts)))
+            pairs = [(got.thrust_N, "thrust_N", 1.0), (got.rpm, "rpm", 1.0), (got.battery_A, "current_A", 0.5)]
+            off = np.concatenate([share * (model - v[name]) / full[name] for model, name, share in pairs])
+            # what was not recorded says nothing; a drive without a solution is off by all there is
+            told = np.isfinite(np.concatenate([v[name] for _, name, _ in pairs]))
+            return np.where(told, np.nan_to_num(off, nan=1.0), 0.0)
 
         x0 = np.clip([math.log(begin[n] + 1e-9) for n in names], low + 1e-6, high - 1e-6)
         found = least_squares(misfit, x0, bounds=(low, high), loss="soft_l1", f_scale=0.03, x_scale=0.1, diff_step=1e-4)
