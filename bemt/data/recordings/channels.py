@@ -40,9 +40,8 @@ _DRIVE_SPEEDS = {
     "ESC_rpm": "right only if the ESC was given the pole count and there is no gear",
 }
 """Speeds that are the rotor's where there is no other, and on what condition."""
-# Says neither whose power it is.
-_ELECTRIC = {"current_A", "electrical_power_W"}
-_BARE_POWER = re.compile(r"\s*power\s*[\[(]\s*w(atts?)?\s*[\])]\s*", re.IGNORECASE)
+_NO_MOTOR = 0.95
+"""Shaft power over electrical power that no motor with its controller reaches: declared. [1]"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +150,8 @@ def named(d: Dataset) -> Dataset:
     _angular(d, values, names, notes)
     _speed(d, values, names, notes)
     _command(values, names, notes)
-    plain = names.get("power_W") == "power_W" and _BARE_POWER.fullmatch(d.headings.get("power_W", ""))
+    # a heading that says power, and not whose
+    plain = names.get("power_W") == "power_W" and d.headings.get("power_W", "power_W") != "power_W"
     _power(values, names, notes, values.get("power_W") if plain else d.values.get("P_W"))
     if plain and "power_W" in values:
         notes.append("power_W: taken as shaft power; if a wattmeter read it, name the column electrical_power_W")
@@ -240,11 +240,16 @@ def electrical_power(values: Mapping[str, Array]) -> Array | None:
 
 
 def _power(values: dict[str, Array], names: dict[str, str], notes: list[str], bare: Array | None) -> None:
-    """Electrical power from its factors, and what a bare P stands for: without a torque, it is not of the shaft."""
-    if bare is not None and "voltage_V" in values and not {"torque_Nm", *_ELECTRIC} & values.keys():
+    """Electrical power from its factors, and what a bare P stands for: without a torque, it is a wattmeter's."""
+    beside = {"voltage_V", "current_A"} & values.keys()
+    product = electrical_power(values)
+    with np.errstate(all="ignore"):
+        share = 1.0 if bare is None or product is None else float(np.nanmedian(np.abs(bare / product)))
+    metered = beside and share > _NO_MOTOR and not {"torque_Nm", "electrical_power_W"} & values.keys()
+    if bare is not None and metered:
         names["electrical_power_W"] = names.pop("power_W", "P_W")
         values["electrical_power_W"] = values.pop("power_W", bare)
-        notes.append(f"{names['electrical_power_W']} is electrical_power_W: a voltage is beside it, and no torque")
+        notes.append(f"{names['electrical_power_W']} is electrical_power_W: no torque is beside it")
     elif bare is not None and "power_W" not in values:
         shaft = shaft_power(values)
         electric = electrical_power(values)

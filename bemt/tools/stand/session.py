@@ -21,7 +21,7 @@ from bemt.base.page import render
 from bemt.base.tables import json_text, write_atomic
 from bemt.judge.actions import plan
 from bemt.judge.diagnose.folder import beside
-from bemt.judge.diagnose.suggest import minutes
+from bemt.judge.loss import minutes
 from bemt.judge.proof import prove
 from bemt.judge.proof.course import Course
 from bemt.judge.proof.loop import A_RUN, Points, follow
