@@ -166,6 +166,7 @@ def test_one_of_several_tables_is_asked_for_and_taken_by_name_at_every_door(form
     _two_tables(file, form)
     with pytest.raises(InputError, match="first run.*second run") as error:
         import_file(file)
+    assert error.value.faults[0].choices == ("first run", "second run"), "so that a page may ask"
     shown = str(error.value).split('"')[1]
     assert np.array_equal(import_file(shown)["thrust_N"], [row[1] for row in ROWS[1:]])
     second = import_file(f"{file}#second run")["thrust_N"]
