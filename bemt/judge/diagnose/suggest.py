@@ -16,7 +16,7 @@ from bemt.base.gaussian.whitening import whitener
 from bemt.base.units import ZERO_CELSIUS, suffixes
 from bemt.data.readers.recording_toml import QUANTITIES
 from bemt.data.recordings.shown import options_of
-from bemt.judge.compare.change_document import AIR_OF_BOTH, DAYS
+from bemt.judge.compare.change_document import AIR_OF_BOTH, DAYS, title_of
 from bemt.judge.diagnose import noise
 from bemt.judge.diagnose.assemble import assemble
 from bemt.judge.diagnose.form import ALIKE
@@ -134,7 +134,7 @@ class Suggestion:
         if not self.separates:
             return ""
         both = f"{self.after:.1f} instead of {self.before:.1f}"
-        return f" (tells {' from '.join(self.separates)} at {both} standard deviations)"
+        return f" (tells {' from '.join(map(title_of, self.separates))} at {both} standard deviations)"
 
     def document(self) -> Mapping[str, object]:
         """Plain values for JSON."""
@@ -423,7 +423,7 @@ def look(names: Sequence[str], record: Record) -> Suggestion | None:
     """A check by hand that confirms the first explanation or rules out the second, whichever there is."""
     for aim, name in zip(("confirm", "rule out"), names, strict=False):
         if check := _check(name, record):
-            return Suggestion(f"to {aim} {name}, {check}", (), (), 0.0, 0.0, "look", checks=name,
+            return Suggestion(f"to {aim} {title_of(name)}, {check}", (), (), 0.0, 0.0, "look", checks=name,
                               minutes=minutes("look", 0))  # fmt: skip
     return None
 

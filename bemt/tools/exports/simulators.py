@@ -274,8 +274,8 @@ class MujocoExport(LoadsExport):
         """MJCF and callback."""
         name = plain_name(job.case.name)
         t = job.performance
-        top_T = 4.0 * float(np.abs(t.thrust_N).max())
-        top_Q = max(4.0 * float(np.abs(t.torque_Nm).max()), 0.5 * t.diameter_m * top_T)
+        top_T, top_Q = (2.0 * load for load in t.greatest)  # room for denser air and a wind across the shaft
+        top_Q = max(top_Q, 0.5 * t.diameter_m * top_T)
         axes = np.eye(6, dtype=int)
         words = ("force_x", "force_y", "thrust", "moment_x", "moment_y", "torque")
         actuators = "\n".join(
