@@ -365,7 +365,8 @@ class LoadsExport(Export):
                 "flight_upper_half_of_rpm": _worst(share[rpm >= 0.5 * table.rpm[-1]]),
             }
         return {
-            "fit_error_pct": errors | {"of": "the greatest load at the same rpm; at rest the load itself", "points": int(rpm.size)},
+            "fit_error_pct": errors
+            | {"of": "the greatest load at the same rpm; at rest the load itself", "points": int(rpm.size)},
             "oblique_error_pct": self.hub_checked(job, files),
             "band": job.band.document(),
             "range": table.range_document(),

@@ -120,8 +120,8 @@ def judge(
         half = max(own, float(stats.t.ppf(0.975, n - 1 + TOTAL_FREE)) * total_sd(calm))
     cause = beside.change.causes if beside.change is not None else ()
     out = FlightVerdict(
-        sure.said, change - change.mean(), next_flight(sure.said, layout, n, day == ""), sure.found, sure.P, sure.scatter,
-        _visible(calm, layout, label, day), total=float(change.mean()) if n else float("nan"), total_half=half,
+        sure.said, change - change.mean(), next_flight(sure.said, layout, n, day == ""), sure.found, sure.P,
+        sure.scatter, _visible(calm, layout, label, day), total=float(change.mean()) if n else float("nan"), total_half=half,
         given=n, in_flight=bool(sure.said.effects) and set(sure.said.effects) <= set(cause),
     )  # fmt: skip
     if sure.said.verdict == "none" and out.total_moved:

@@ -176,9 +176,9 @@ _SLOWEST_S, _LEAST_SEEN = 0.5, 0.5  # longest lag tried [s]; share of the varian
 def simulator_constants(log: FlightLog, found: Identified) -> dict[str, Constant]:
     """Constants in the units of simulators, those that the flight shows.
 
-    Thrust constant [N/(rad/s)^2], the speed at which it carries the weight in still air [rad/s], mean command, torque constant over yaw inertia
-    [(rad/s^2)/(rad/s)^2], motor time constant [s]. The band of the thrust constant holds what flights of one vehicle
-    differ by; the others are of this flight.
+    Thrust constant [N/(rad/s)^2], the speed at which it carries the weight in still air [rad/s], mean command, torque
+    constant over yaw inertia [(rad/s^2)/(rad/s)^2], motor time constant [s]. The band of the thrust constant holds what
+    flights of one vehicle differ by; the others are of this flight.
     """
     out: dict[str, Constant] = {}
     sd, factor = flight_scatter([])
