@@ -110,9 +110,9 @@ def _where(w: Location) -> str:
         size, most = w.size, " of its largest value"
         most += "" if w.variable == "rpm" and w.high > w.low else " at that speed"
     error = max(abs(error * size / w.size), 1e-3) if w.size else error
-    spread = "" if not np.isfinite(error) else f" ± {100.0 * error:.1f} %"
-    return f"{_CHANNEL[w.channel]} is {'high' if size > 0 else 'low'} by {100.0 * abs(size):.1f}{spread or ' %'}{most}, " \
-           f"at {name} {both}."  # fmt: skip
+    spread = f" ± {100.0 * error:.1f}" if np.isfinite(error) else ""
+    way = "high" if size > 0 else "low"
+    return f"{_CHANNEL[w.channel]} is {way} by {100.0 * abs(size):.1f}{spread} %{most}, at {name} {both}."
 
 
 def _unexplained(d: Diagnosis) -> list[str]:

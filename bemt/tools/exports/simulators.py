@@ -76,7 +76,7 @@ class GazeboExport(LoadsExport):
         """What this model class leaves out."""
         return [
             "base, rotor link and joint are a stand: the plugin is what goes into your vehicle",
-            "the constants are fitted at rest; thrust does not fall with airspeed here: see fit_error_pct.thrust.flight",
+            "the constants are fitted at rest; thrust does not fall with airspeed: see fit_error_pct.thrust.flight",
             "rotorDragCoefficient and rollingMomentCoefficient are fitted in edgewise flow up to the airspeed of zero "
             "thrust; pitch moment, side force and the gain of thrust across the shaft are not in this model",
             "the plugin's rolling moment does not know the direction of rotation: the sign of its coefficient is that "

@@ -121,8 +121,8 @@ def judge(
     cause = beside.change.causes if beside.change is not None else ()
     out = FlightVerdict(
         sure.said, change - change.mean(), next_flight(sure.said, layout, n, day == ""), sure.found, sure.P,
-        sure.scatter, _visible(calm, layout, label, day), total=float(change.mean()) if n else float("nan"), total_half=half,
-        given=n, in_flight=bool(sure.said.effects) and set(sure.said.effects) <= set(cause),
+        sure.scatter, _visible(calm, layout, label, day), total=float(change.mean()) if n else float("nan"),
+        total_half=half, given=n, in_flight=bool(sure.said.effects) and set(sure.said.effects) <= set(cause),
     )  # fmt: skip
     if sure.said.verdict == "none" and out.total_moved:
         step = "weigh the vehicle and charge the battery, then hover 30 s; --healthy-mass-kg, the mass of the " \
