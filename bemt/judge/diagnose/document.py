@@ -112,7 +112,10 @@ def _where(w: Location) -> str:
     error = max(abs(error * size / w.size), 1e-3) if w.size else error
     spread = f" ± {100.0 * error:.1f}" if np.isfinite(error) else ""
     way = "high" if size > 0 else "low"
-    return f"{_CHANNEL[w.channel]} is {way} by {100.0 * abs(size):.1f}{spread} %{most}, at {name} {both}."
+    told = f"{way} by {100.0 * abs(size):.1f}{spread} %{most}"
+    if not most and not _PERCENT[0] < 1.0 + size < _PERCENT[1]:
+        told = f"{_share(size)} of what the case gives"
+    return f"{_CHANNEL[w.channel]} is {told}, at {name} {both}."
 
 
 def _unexplained(d: Diagnosis) -> list[str]:
