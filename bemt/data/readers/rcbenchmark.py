@@ -157,8 +157,10 @@ def _speeds(build: Builder) -> None:
         build.flag(np.flatnonzero(wild), f"spike of {name}")
     electrical = next((n for n in build.channels if n.startswith("electrical_rpm")), None)
     electric, optical = (build.at(n) for n in _SPEEDS)
-    both = np.zeros(0) if electric is None or optical is None else electric[(electric > 0) & (optical > 0)] / \
-        optical[(electric > 0) & (optical > 0)]  # fmt: skip
+    both = np.zeros(0)
+    if electric is not None and optical is not None:
+        good = (electric > 0) & (optical > 0)
+        both = electric[good] / optical[good]
     ratio = float(np.median(both)) if both.size >= 3 else math.nan
     text = f"electrical over optical speed: median {ratio:.4g} in {both.size} rows"
     agree = abs(ratio - 1.0) < 0.05
