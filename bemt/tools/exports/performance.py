@@ -122,8 +122,8 @@ class Performance:
     @property
     def greatest(self) -> tuple[float, float]:
         """Greatest thrust [N] and torque [N m] up to that airspeed; nodes of a table beyond it are no flight."""
-        J_met = self.fastest_m_s / (self.rpm[:, None] / 60.0 * self.diameter_m)
-        met = self.J[None, :] <= J_met * (1.0 + 1e-9)
+        airspeed = np.outer(self.rpm / 60.0 * self.diameter_m, self.J)
+        met = airspeed <= self.fastest_m_s * (1.0 + 1e-9)
         return float(np.abs(self.thrust_N[met]).max()), float(np.abs(self.torque_Nm[met]).max())
 
     def range_document(self) -> dict[str, Any]:
