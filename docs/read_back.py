@@ -279,11 +279,13 @@ def page() -> str:
     job = example()
     fan = Job(load_case(CASES / "ds30/case.toml"), None, 20.0)
     kept = json.loads(KEPT.read_text(encoding="utf-8"))
+    still = 0.0
     kinds: dict[str, list[str]] = {"solid": [], "loads": [], "disk": [], "blade": []}
     for word, target in exports().items():
         row = f"| `{word}` | {target.holds} |" if target.kind != "solid" else f"`{word}`"
         if target.kind == "loads":
             error = entry(target, job, target.write(job))["fit_error_pct"]
+            still = error["thrust"]["at_rest"] if word == "gazebo" else still
             row += f" {_percent(error['thrust'])} | {_percent(error['torque'])} |"
         if target.kind == "blade":
             asked = fan if word == "dfdc" else job
@@ -319,8 +321,8 @@ to 10,000 rev/min; `dfdc` uses the fan `ds30`.
 {chr(10).join(kinds["loads"])}
 
 The errors are those of the model class, from static to zero thrust. Targets of one or three numbers err with speed,
-too: give `--rpm` near the speed you fly. A single constant (`gazebo`) is right at rest and off by the whole thrust in
-flight. Beyond the tables programs hold the last value.
+too: give `--rpm` near the speed you fly. A single constant (`gazebo`) is within {still:.0f} % at rest and off by the
+whole thrust in flight. Beyond the tables programs hold the last value.
 
 ### From rest, at the program's own step
 

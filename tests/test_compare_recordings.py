@@ -311,6 +311,18 @@ def test_every_answer_that_is_not_sure_has_a_step_and_its_command(tmp_path: Path
         assert not first.startswith("verdict") and "thrust" in first.lower()
 
 
+def test_causes_are_said_by_their_titles_and_in_one_list(tmp_path: Path) -> None:
+    """Identifiers stay in the verdict and in JSON; what the headline guesses is what stands below."""
+    answer = compare(*pair(tmp_path, scaled(thrust_N=0.85, torque_Nm=0.82), seed=3))
+    said = " ".join(line for line in answer.text.splitlines() if not line.startswith("verdict: "))
+    glued = [name for name in catalogue() if "_" in name]
+    assert not [name for name in glued if name in said.partition("Next: ")[0]]
+    listed = [r["effect"] for r in answer.document["ranking"] if r["probability"] >= 0.1]
+    first = " ".join(said.partition("verdict")[0].split())
+    for name in (k for k in listed if k in catalogue()):
+        assert answer.verdict != "insufficient" or catalogue()[name].title in " ".join(said.split()), (name, first)
+
+
 def test_a_cause_that_leaves_a_changed_load_alone_is_not_given(tmp_path: Path) -> None:
     """Thrust that scatters by half hides its change from the weighing, not from the ratio."""
     rng = np.random.default_rng(5)

@@ -10,6 +10,7 @@ import re
 import shutil
 import subprocess
 import sys
+import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -30,7 +31,7 @@ from bemt.tools.exports.blades import baked
 from bemt.tools.exports.flow_solvers import read_profile, read_vbm
 from bemt.tools.exports.folder import export_case
 from bemt.tools.exports.parts import entry
-from bemt.tools.exports.performance import solve_points
+from bemt.tools.exports.performance import DIVE, solve_points
 from geometry import export as module
 from geometry.airfoil import naca4
 from geometry.common import GeometryError
@@ -144,8 +145,32 @@ def test_the_stated_error_holds_at_points_nobody_fitted(word: str, job: Job) -> 
             assert share.max() < 0.3
 
 
-CLAIMED = {  # stated errors of thrust and torque [%] of a 10x5: what the model class can do, with room for a tenth
-    "px4": ("flight", 9.0, 8.5), "gazebo": ("at_rest", 7.5, 1.2), "rotorpy": ("at_rest", 17.5, 25.0),
+def test_the_error_at_rest_is_of_the_load_itself_to_the_ends_of_the_range(job: Job) -> None:
+    """As a user finds it by hand: T = k W^2 beside the library's static thrust."""
+    target, files = exports()["gazebo"], written("gazebo", job)
+    assert isinstance(target, LoadsExport)
+    stated, rpm = entry(target, job, files)["fit_error_pct"], target.asked(job).performance.rpm
+    truth = solve_points(job.case, rpm, 0.0)
+    for name, got, exact in zip(("thrust", "torque"), target.loads(files, rpm, 0.0 * rpm),
+                                (truth.thrust_N, truth.torque_Nm), strict=True):  # fmt: skip
+        assert 100.0 * np.max(np.abs(got / exact - 1.0)) <= stated[name]["at_rest"] + 1e-6
+
+
+def test_ranges_are_those_of_the_rotor(job: Job) -> None:
+    """Not those of the last node of a table, which no flight reaches."""
+    t, files = job.performance, written("mujoco", job)
+    item = entry(exports()["mujoco"], job, files)
+    assert item["range"]["J"] == [0.0, pytest.approx(float(t.J_zero.max()))]
+    assert item["range"]["airspeed_m_s_greatest"] == pytest.approx(
+        DIVE * t.J_zero.max() * t.rpm[-1] / 60.0 * t.diameter_m)  # fmt: skip
+    ends = {a.get("name"): [float(v) for v in str(a.get("ctrlrange")).split()]
+            for a in ET.fromstring(str(files["prop_10x5.xml"])).iter("general")}  # fmt: skip
+    static = float(t.thrust_N[-1, t.at_rest])
+    assert static < ends["prop_10x5_thrust"][1] < 6.0 * static, "a rotor of 14 N has no actuator of thousands"
+
+
+CLAIMED = {  # stated errors of thrust and torque [%] of a 10x5, ends of the speeds included, with room for a tenth
+    "px4": ("flight", 10.2, 9.1), "gazebo": ("at_rest", 8.8, 1.35), "rotorpy": ("at_rest", 17.5, 25.0),
     "ardupilot": ("at_rest", 13.0, None),
 }  # fmt: skip
 
@@ -242,7 +267,7 @@ def test_another_format_keeps_what_is_there_and_says_what_is_stale(
         there = {p.relative_to(out).as_posix() for p in out.rglob("*") if p.is_file()} - {"manifest.json"}
         entries = manifest.get("targets", [])
         named = {f"{t['target']}/{f['path']}" for t in entries for f in t["files"]}
-        assert there == named | {f["path"] for f in manifest["files"]} | set(
+        assert there == named | {f["path"] for f in manifest.get("files", ())} | set(
             manifest.get("openfoam", {}).get("files", {})
         )
         return sorted(manifest["case_sha256"]), said["kept"], said["stale"]

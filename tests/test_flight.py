@@ -66,6 +66,8 @@ def test_constants_for_a_simulator(script: dict[str, Any], flights: Path) -> Non
     k = got["thrust constant"]
     assert k.unit == "N/(rad/s)^2" and abs(k.value - script["K"] * (30.0 / np.pi) ** 2) < k.half
     assert 0.015 < k.half / k.value < 0.04
+    carried = log.rotors * k.value * got["hover speed"].value ** 2
+    assert carried == pytest.approx(9.80665 * script["MASS"], rel=1e-6), "the speed at which this constant hovers"
     assert "motor time constant" not in got, "these motors follow at once"
 
 
@@ -313,6 +315,7 @@ def test_command_prints_and_writes(flights: Path, tmp_path: Path, capsys: pytest
     said = json.loads(capsys.readouterr().out)
     assert said["schema"] == "bemt.flight/1" and said["decision"]["effects"] == ["damaged blade, motor 3"]
     assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
+    assert main(call) == 0 and "N/(rad/s)^2" in capsys.readouterr().out, "who states the mass asks for constants"
     (tmp_path / "no.bin").write_bytes(b"\0" * 100)
     assert main(["fly", str(tmp_path / "no.bin")]) == 2
 
@@ -391,6 +394,15 @@ def test_recorded_quadrotor_with_cut_blades(cut: dict[str, dict[str, FlightVerdi
             assert not got.said.effects or got.said.effects[0] == "damaged blade, motor 3", name
         large = [got for name, got in answers.items() if name.startswith(THREE_MM)]
         assert sum(bool(got.said.effects) for got in large) >= (7 if day else 5)
+
+
+def test_a_cause_that_is_likely_but_not_sure_is_said_to_be(cut: dict[str, dict[str, FlightVerdict]]) -> None:
+    """No rival is made up, the day is asked for where it is open, and the likely motor is the first to be looked at."""
+    for day, answers in cut.items():
+        got = answers["cut_propeller_M3_3mm__log01"]
+        assert got.said.verdict == "insufficient" and got.probability[got.said.leading] > 0.5
+        assert "several" not in got.said.why and "motor 3" in got.said.why and "motor 3" in got.next.text
+        assert ("--healthy-day" in got.next.text) == (not day)
 
 
 @pytest.mark.xfail(strict=True, reason="a weight on a string near motor 3 moves the total drive as well: insufficient")

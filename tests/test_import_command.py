@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import math
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -334,3 +335,25 @@ def test_a_unit_is_taken_by_a_heading_or_a_quantity_in_any_case(tmp_path: Path, 
         np.array([110, 196, 306]) * 9.80665e-3
     )
     assert main(["import", str(file), "--unit", told.replace("=g", "=parsec")]) == 2
+
+
+def test_what_needs_no_action_has_a_mark_of_its_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A sound recording has no exclamation mark; one without the unit of its thrust is not to be diagnosed yet."""
+    file = tmp_path / "good.csv"
+    scatter = np.random.default_rng(1).normal(1.0, 0.01, (11, 5))
+    rows = [(1200 + 60 * k, 6e-10 * n**2 * a, 4e-9 * n**2 * b, 16.0 * c, 1.0 + 6e-8 * n**2 * d, n, n * (0.999 + 0.001 * e))
+            for k, n, (a, b, c, d, e) in zip(range(11), np.linspace(3000.0, 9000.0, 11), scatter, strict=True)]  # fmt: skip
+    head = "ESC signal (µs),Torque (N·m),Thrust (kgf),Voltage (V),Current (A),Motor Electrical Speed (RPM)," \
+           "Motor Optical Speed (RPM)"  # fmt: skip
+    body = "".join(",".join(f"{v:.5g}" for v in row) + "\n" for row in rows)
+    file.write_text(f"{head}\n{body}", encoding="utf-8")
+    assert main(["import", str(file)]) == 0
+    said = capsys.readouterr().out
+    assert "  ! " not in said and "Next: bemt diagnose" in said
+    file.write_text(f"{head}\n{body}".replace("Thrust (kgf)", "Thrust"), encoding="utf-8")
+    assert main(["import", str(file)]) == 0
+    said = capsys.readouterr().out
+    (step,) = [line for line in said.splitlines() if line.startswith("Next: ")]
+    assert "--unit Thrust=UNIT" in step and "diagnose" not in step
+    words = shlex.split(step.removeprefix("Next: bemt ").partition("   (")[0].replace("UNIT", "kgf"))
+    assert main(words) == 0 and "thrust_N" in capsys.readouterr().out

@@ -166,6 +166,23 @@ def test_nobody_loses_a_case(capsys: pytest.CaptureFixture[str]) -> None:
     assert Path("prop_10x5/case.toml").read_bytes() == before
 
 
+def test_a_case_gets_its_motor_later(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """As it was written it is written again with the motor; one that was changed stays, and the way is said."""
+    motor = ["--kv", "826", "--cells", "4"]
+    assert main(["new", "10x4.5"]) == 0 and main(["new", "10x4.5", *motor]) == 0
+    assert load_case(here / "prop_10x4.5").file.drive is not None
+    assert main(["new", "10x5"]) == 0
+    own = here / "prop_10x5" / "case.toml"
+    own.write_text(own.read_text() + "# mine\n")
+    assert main(["new", "10x5", *motor]) == 2 and own.read_text().endswith("# mine\n")
+    assert "[drive]" in capsys.readouterr().err
+
+
+def test_a_name_before_the_label_is_the_name_of_the_case(here: Path) -> None:
+    assert main(["new", "quad=10x4.5"]) == 0
+    assert load_case(here / "quad").name == "quad" and not (here / "prop_10x4.5").exists()
+
+
 def test_a_label_with_its_motor_needs_no_file(capsys: pytest.CaptureFixture[str]) -> None:
     motor = ["--kv", "900", "--cells", "3", "--mass-kg", "1.4", "--rotors", "4", "--capacity-Ah", "3"]
     words = ["drive", "10x4.5", *motor]

@@ -106,7 +106,8 @@ def new(
     Parameters
     ----------
     label : str, optional
-        As on the propeller: ``10x5``; with ``--fan`` the diameter, ``70mm``; with a file the name of the case.
+        As on the propeller: ``10x5``, or ``quad=10x5`` with a name for the case; with ``--fan`` the diameter, ``70mm``;
+        with a file the name of the case.
     stations : str or path, optional
         File with blade stations: CSV with r_over_R, chord_over_R, beta_deg (or r_mm, chord_mm); UIUC geometry; APC PE0.
     scan : str or path, optional
@@ -165,9 +166,11 @@ def new(
         raise InputError(Fault("", "--diameter-mm, --diameter-in", "both", "one of them"))
     diameter_mm = diameter_mm if diameter_in is None else diameter_in * 25.4
     table, solid = (None if path is None else os.fspath(path) for path in (stations, scan))
+    name, is_named, rest = (label or "").partition("=")
+    label = rest if is_named else label
     wanted = new_folder.Wanted(label, table, solid, unit, diameter_mm, fan, blades, rpm, airspeed_m_s, series, kv,
                                cells, campaign, None if reading is None else reading_text(reading),
-                               diameter_in is not None)  # fmt: skip
+                               diameter_in is not None, name if is_named else "")  # fmt: skip
     folder, files, notes = new_folder.write(wanted, None if out is None else os.fspath(out))
     if fan and label and re.fullmatch(r"[\d.]+x[\d.]+(x\d+)?", label):
         notes = [*notes, f"the chord, hub and sections are those of ducted fans, not of a propeller {label}"]

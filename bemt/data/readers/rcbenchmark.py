@@ -32,7 +32,7 @@ from bemt.base.tables import number_of
 from bemt.data.readers import head_text, number
 from bemt.data.readers._large import NumberTable
 from bemt.data.readers.headings import heading
-from bemt.data.readers.recording import Builder, slip
+from bemt.data.readers.recording import Builder, Told, slip
 from bemt.data.readers.samples import MISREAD, MOST_RPM_PER_V, against_load, spikes
 from bemt.data.readers.split import SplitTable
 from bemt.physics.dataset import Dataset
@@ -156,7 +156,15 @@ def _speeds(build: Builder) -> None:
             wild |= moving > MOST_RPM_PER_V * np.where(volt > 0.5, volt, np.inf)
         build.flag(np.flatnonzero(wild), f"spike of {name}")
     electrical = next((n for n in build.channels if n.startswith("electrical_rpm")), None)
-    if electrical and seen:
+    electric, optical = (build.at(n) for n in _SPEEDS)
+    both = np.zeros(0)
+    if electric is not None and optical is not None:
+        good = (electric > 0) & (optical > 0)
+        both = electric[good] / optical[good]
+    ratio = float(np.median(both)) if both.size >= 3 else math.nan
+    text = f"electrical over optical speed: median {ratio:.4g} in {both.size} rows"
+    agree = abs(ratio - 1.0) < 0.05
+    if electrical and seen and not agree:
         build.warnings.append(
             f"{electrical} is derived from the motor's phases with the number of poles set in the stand's software, "
             "which the file does not state; check it against an optical speed, or state it in a recording.toml"
@@ -164,15 +172,12 @@ def _speeds(build: Builder) -> None:
     if "rpm" in build.channels and seen:
         note = "rpm: the file names neither its sensor nor the number of poles set in the stand's software"
         build.warnings.append(note)
-    electric, optical = (build.at(n) for n in _SPEEDS)
-    if electric is not None and optical is not None:
-        good = (electric > 0) & (optical > 0)
-        if np.count_nonzero(good) >= 3:
-            ratio = float(np.median(electric[good] / optical[good]))
-            text = f"electrical over optical speed: median {ratio:.4g} in {np.count_nonzero(good)} rows"
-            near = round(ratio) if ratio > 1 else 1
-            whole = near > 1 and abs(ratio / near - 1) < 0.05
-            build.warnings.append(text + (f"; were {near} pole pairs left out?" if whole else ""))
+    if agree:
+        build.warnings.append(Told(text))
+    elif both.size >= 3:
+        near = round(ratio) if ratio > 1 else 1
+        whole = near > 1 and abs(ratio / near - 1) < 0.05
+        build.warnings.append(text + (f"; were {near} pole pairs left out?" if whole else ""))
 
 
 def _no_current(build: Builder) -> np.ndarray:
@@ -197,16 +202,19 @@ def _power(build: Builder) -> None:
     """Tell which speed the mechanical power was computed with, and whether the units agree."""
     power, torque = build.at("mechanical_power_W"), build.at("torque_Nm")
     volt, ampere, electric = build.at("voltage_V"), build.at("current_A"), build.at("electrical_power_W")
+    same: list[str] = []
     for name in (*_SPEEDS, "rpm"):
         speed = build.at(name)
         if power is None or torque is None or speed is None:
             continue
         ratio = _times(power, np.abs(torque) * speed * units.RPM, power > 0)
         if ratio is not None and math.isclose(ratio, 1.0, rel_tol=0.02):
-            build.warnings.append(f"mechanical_power_W is torque times {name}")
+            same.append(name)
         elif ratio is not None and (name == "optical_rpm" or "optical_rpm" not in build.channels):
             text = f"mechanical_power_W is {ratio:.4g} times torque x {name}{slip(ratio)}"
             build.warnings.append(text + "; nothing was converted")
+    if same:
+        build.warnings.append(Told(f"mechanical_power_W is torque times {' and '.join(same)}"))
     if volt is not None and ampere is not None and electric is not None:
         ratio = _times(electric, volt * ampere)
         if ratio is not None and abs(ratio - 1.0) > 0.1:

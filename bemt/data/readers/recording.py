@@ -59,6 +59,12 @@ SLIP = 0.02
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(,\d{3})+(\.\d*)?")
 
 
+class Told(str):
+    """A note on what was found or done, with nothing to do about it."""
+
+    __slots__ = ()
+
+
 @dataclass
 class Builder:
     """Gathers the channels, texts, flags and warnings of one table and makes the `Dataset`."""
@@ -84,9 +90,9 @@ class Builder:
     def __post_init__(self) -> None:
         self.warnings.extend(self.table.warnings)
         if self.decimal == ".,":
-            self.warnings.append("commas between thousands left out")
+            self.warnings.append(Told("commas between thousands left out"))
         if self.decimal == ",":
-            self.warnings.append("decimal commas read as decimal points")
+            self.warnings.append(Told("decimal commas read as decimal points"))
         if self.table.cut is not None:
             self.flag([self.table.cut], "line cut off at the end of the file")
         self.flag(self.table.misfits, f"not {self.table.width} cells", "; no value of them is taken")
@@ -236,7 +242,7 @@ class Builder:
             name = self.free(f"{base}_s")
             self.channels[name], self.headings[name] = Channel(seconds, "s"), head.text
             self.clocks.append(name)
-            self.warnings.append(f"column {label!r} is a clock: seconds since {column[0] or 'its first time'}")
+            self.warnings.append(Told(f"column {label!r} is a clock: seconds since {column[0] or 'its first time'}"))
             return name
         self.texts[self.free(base)] = tuple(column)
         if len(bad) < filled:
@@ -335,21 +341,23 @@ class Builder:
             self.fault("", f"no column of numbers ({columns})", "one column of numbers or more")
         self.check()
         if self.empty:
-            self.warnings.append(f"no values in {number_of(len(self.empty), 'column')}: {some(self.empty, 8)}")
+            self.warnings.append(Told(f"no values in {number_of(len(self.empty), 'column')}: {some(self.empty, 8)}"))
         if self.words:
             note = f"text, kept as such, in {number_of(len(self.words), 'column')}: {some(self.words, 8)}"
-            self.warnings.append(note)
+            self.warnings.append(Told(note))
         if self.unitless:
             hint = "Name units in the headings or in a recording.toml" + _nearest(self.unitless, self.channels)
             self.warnings.append(f"no unit known, none assumed, for {some(self.unitless, 8)}. {hint}")
-        asks = [*self.asks, *_asked(self.unitless, self.channels)]
-        if asks and self.format == "table":
+        said = {**self.table.source.about, "declared": self.declared, **(provenance or {})}
+        asked = _asked(self.unitless, self.channels)
+        if asks := [*self.asks, *asked.values()]:
             file = Path(self.table.source.name)
             out = shlex.quote(file.with_name("recording.toml").as_posix())
             step = f"bemt import {shlex.quote(file.as_posix())} {' '.join(asks)} --out {out}"
             own = [f"your {what} in place of {mark}" for mark, what in _OWN.items() if mark in step]
             self.warnings.append(f"in one step, with {' and '.join(own)}: {step}" if own else step)
-        said = {**self.table.source.about, "declared": self.declared, **(provenance or {})}
+            if self.asks or _NEEDED & asked.keys():
+                said["step"] = f"{step}   ({' and '.join(own)})" if own else step
         flags: list[tuple[str, ...]] = [()] * len(self.table) if self.flags else []
         for row, words in self.flags.items():
             flags[row] = tuple(words)
@@ -361,6 +369,8 @@ class Builder:
 
 _OWN = {"UNIT": "units", "PAIRS": "number"}
 """What a user puts in place of a mark."""
+_NEEDED = {"rpm", "thrust", "torque"}
+"""Quantities of which nothing can be said while their unit is open."""
 _PLAUSIBLE: dict[str, tuple[float, float, str]] = {
     "rpm": (150.0, 3e5, "rev/s, rad/s or electrical revolutions?"),
     "pulse_width_s": (5e-4, 3e-3, "Microseconds against milliseconds?"),
@@ -384,8 +394,8 @@ _MEANINGS = ("rpm", "thrust", "torque", "voltage", "current", "power", "time", "
              "temperature", "density", "humidity")  # fmt: skip
 
 
-def _asked(headings: Sequence[str], channels: Iterable[str]) -> list[str]:
-    """Options of ``bemt import`` that state the unit of headings whose words are one quantity."""
+def _asked(headings: Sequence[str], channels: Iterable[str]) -> dict[str, str]:
+    """Options of ``bemt import``, by quantity, that state the unit of headings whose words are one quantity."""
     out: dict[str, str] = {}
     names = [label[1:].rsplit("'", 1)[0].split("' (")[0] for label in headings]
     channels = {*channels} - {slug(name) for name in names}
@@ -395,7 +405,7 @@ def _asked(headings: Sequence[str], channels: Iterable[str]) -> list[str]:
         quantity = found.pop() if len(found) == 1 else ""
         if quantity and not any(k == quantity or k.startswith(f"{quantity}_") for k in channels):
             out.setdefault(quantity, f"--unit {shlex.quote(name)}=UNIT")
-    return list(out.values())
+    return out
 
 
 def _nearest(headings: Sequence[str], channels: Iterable[str] = ()) -> str:

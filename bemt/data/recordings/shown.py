@@ -25,6 +25,7 @@ from bemt.base import tables
 from bemt.base.averaging import Mean
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK
 from bemt.data.readers.cfd_run import KIND as RUN
+from bemt.data.readers.recording import Told
 from bemt.data.recordings import cfd_run
 from bemt.data.recordings.cfd_setup import CfdRun
 from bemt.data.recordings.channels import named
@@ -154,6 +155,11 @@ class ImportedFile:
         kind, rows = (self.record.kind, len(self.record)) if self.record else (None, 0)
         return f"{self.path}: {self.format} ({kind}), {rows} rows"
 
+    @property
+    def step(self) -> str:
+        """Command that states what it leaves open of its loads or its speed; empty where nothing is."""
+        return "" if self.record is None else self.record.provenance.get("step", "")
+
     def document(self) -> dict[str, Any]:
         """Plain values."""
         record = self.record
@@ -202,7 +208,8 @@ class ImportedFile:
             lead = "  not averaged: " if rows else "  channels: "
             lines.append(textwrap.fill(", ".join(plain), 110, initial_indent=lead, subsequent_indent="    "))
         lines += points_text(self.reduced) if self.reduced is not None else _curve(self.record) if curve else []
-        lines += [f"  ! {text}" for text in self.warnings]
+        step = self.step.partition("   (")[0]  # it stands under Next
+        lines += [f"  {'.' if isinstance(w, Told) else '!'} {w}" for w in self.warnings if not step or step not in w]
         lines += [text for text in told if text not in errors]
         return "\n".join(lines)
 
@@ -257,7 +264,9 @@ class Imported:
         return f"{lead}Next: bemt compare {' '.join([shlex.quote(file), *options_of(said)])}{_a_case(said)}\n"
 
     def _next_with_recordings(self, said: Mapping[str, Sequence[str | float]]) -> list[str]:
-        """What to do with recordings of loads, if they have the speed."""
+        """What to do with recordings of loads, if they have the speed; first what states a load that was not read."""
+        if steps := [f.step for f in self.files if f.step]:
+            return [f"Next: {steps[0]}\n"]
         read = [(f.path, f.record.kind, set(named(f.record).values)) for f in self.files if f.record]
         loaded = [shlex.quote(p) for p, _, known in read if _LOADS & known and "rpm" in {*known, *said}]
         if not loaded and any(_LOADS & channels for _, kind, channels in read if kind == "bench"):

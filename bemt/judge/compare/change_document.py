@@ -226,10 +226,6 @@ def _intervals(channels: Sequence[Ratio]) -> list[list[str]]:
     return [said[i : i + 3] for i in range(0, len(said), 3)]
 
 
-def _title(name: str) -> str:
-    return f"{name} ({_plain(name)})" if law(name) or name in catalogue() else name
-
-
 def _range(r: Ratio) -> str:
     low, high = r.range
     if r.over_command:
@@ -291,7 +287,7 @@ def headline(doc: ComparedRuns) -> str:
         return f"Nothing but the air changed, as recorded ({moved}); the coefficients agree."
     if len(effects) == 1:
         lead = "The stand, not the rotor" if verdict == "sensor" else "What changed"
-        return f"{lead}: {_plain(effects[0])} ({moved or 'drive alone'})."
+        return f"{lead}: {title_of(effects[0])} ({moved or 'drive alone'})."
     several = families(effects, doc.ranking)
     if several.count(", or ") >= _MANY:  # what was measured first, where little is known of the cause
         return f"{moved[0].upper()}{moved[1:]}: {several}." if moved else f"The drive: {several}."
@@ -314,9 +310,13 @@ def _open(doc: ComparedRuns, size: str) -> str:
         return f"These recordings cannot be compared: {doc.rule}."
     if doc.rule.startswith(SPREAD):
         return f"These recordings cannot say whether anything changed{size}; two runs may differ by as much."
-    likely = [r.effect for r in doc.ranking if r.probability >= _GUESS]
-    guess = "" if doc.rule == OTHER_STAND else families(likely, doc.ranking)
+    guess = "" if doc.rule == OTHER_STAND else families(_likely(doc), doc.ranking)
     return f"These recordings cannot say what changed{size}" + (f"; likeliest {guess}." if guess else ".")
+
+
+def _likely(doc: ComparedRuns) -> list[str]:
+    """Causes that are likely enough to be said as a guess, the likeliest first."""
+    return [r.effect for r in doc.ranking if r.probability >= _GUESS and r.effect not in ("none", "unknown")]
 
 
 def families(effects: Sequence[str], ranking: Sequence[RankedCause] = ()) -> str:
@@ -327,13 +327,13 @@ def families(effects: Sequence[str], ranking: Sequence[RankedCause] = ()) -> str
         if k not in ("none", "unknown"):
             titles.setdefault(FAMILY.get(k, k), []).append(k)
     families = sorted(titles, key=lambda f: -sum(likely.get(k, 0.0) for k in titles[f]))
-    return ", or ".join(_FAMILY_WORD.get(f, f) if len(titles[f]) > 1 else _plain(titles[f][0]) for f in families)
+    return ", or ".join(_FAMILY_WORD.get(f, f) if len(titles[f]) > 1 else title_of(titles[f][0]) for f in families)
 
 
-def _plain(name: str) -> str:
-    """Title of a cause: of its scaling law, or of an effect that has none."""
-    row = law(name) or catalogue().get(name)
-    return row.title if row else _FAMILY_WORD.get(name, name)
+def title_of(name: str) -> str:
+    """Title of a cause, or of a pair of them: of its scaling law, or of an effect that has none."""
+    rows = [(law(k) or catalogue().get(k), k) for k in name.split("+")]
+    return " and ".join(row.title if row else _FAMILY_WORD.get(k, k) for row, k in rows)
 
 
 def _ends(r: Ratio, factor: float = 1.0) -> list[str]:
@@ -352,7 +352,7 @@ def _said(doc: ComparedRuns) -> list[str]:
     out += [t for t in told if not (step.get("text") and t.lstrip().startswith(said_below))]
     drive = doc.subsystems.get("drive")
     if drive and drive.effects and drive.effects != doc.effects:
-        out.append(f"Drive: {drive.verdict}: {', '.join(_title(k) for k in drive.effects)}.")
+        out.append(f"Drive: {drive.verdict}: {', '.join(title_of(k) for k in drive.effects)}.")
     elif drive and doc.verdict != "none" and drive.verdict == "none":
         out.append("Drive: no change beyond scatter.")
     if step.get("text"):
@@ -378,7 +378,7 @@ def _of_loads(loads: Mapping[str, Ratio]) -> list[str]:
 
 def sentence(doc: ComparedRuns) -> str:
     """Verdict and reason."""
-    names = ", ".join(_title(k) for k in doc.effects)
+    names = ", ".join(title_of(k) for k in doc.effects)
     p = doc.probability
     sure = f" (probability {p:.2f})" if p else ""
     if doc.verdict == "none":
@@ -392,7 +392,7 @@ def sentence(doc: ComparedRuns) -> str:
         return f"One of these; the data cannot tell them apart{sure}: {names}."
     if doc.verdict == "unknown":
         return f"Unknown: {doc.rule}."
-    first = [r.effect for r in doc.ranking if r.effect not in ("none", "unknown")][:4]
+    first = [title_of(k) for k in _likely(doc)]
     if doc.rule == OTHER_STAND or doc.rule.endswith((IN_WIND, NOTHING_SHARED)):
         return f"No cause can be given: {doc.rule}."
     if doc.rule.startswith(SPREAD):

@@ -48,6 +48,8 @@ class Location:
     size: float  # Mean mismatch in the interval, share of the largest value of the channel at the speeds there [1]
     z: float  # Sum of the standardised mismatch over the root of the number of readings [1]
     ties: tuple[str, ...]  # Other variables that explain it as well in this plan
+    # Median of the recording over the case there, less 1, as a headline says it; NaN where loads are near zero [1]
+    ratio: float = field(default=float("nan"), compare=False)
     shared: float = field(default=0.0, compare=False)  # Standard uncertainty that all readings share, as stated [1]
     mismatch: Array = field(
         repr=False, compare=False, default_factory=lambda: np.empty(0)
@@ -55,7 +57,8 @@ class Location:
 
     def document(self) -> Mapping[str, object]:
         """Plain values for JSON."""
-        return {k: (list(v) if isinstance(v, tuple) else v) for k, v in vars(self).items() if k != "mismatch"}
+        return {k: (list(v) if isinstance(v, tuple) else v) for k, v in vars(self).items()
+                if k not in ("mismatch", "ratio")}  # fmt: skip
 
 
 def mismatch(found: Evidence, best: Fit) -> Array:
@@ -101,7 +104,10 @@ def _largest(found: Evidence, d: Array, natural: tuple[str, ...]) -> Location:
     low, high, z = _scan(x, e[here])
     inside = (x >= low) & (x <= high)
     size = float(np.mean((d / problem.largest)[here][inside]))
-    return Location(CHANNELS[int(channel)], name, low, high, size, z, ties, 0.0, d)
+    f0 = problem.f0[here][inside]
+    loaded = bool(np.all(np.abs(f0) > _NEAR_ZERO * problem.largest[here][inside]))
+    ratio = float(np.median(problem.y[here][inside] / f0)) - 1.0 if loaded else float("nan")
+    return Location(CHANNELS[int(channel)], name, low, high, size, z, ties, ratio, 0.0, d)
 
 
 def _groups(x: Array) -> NDArray[np.intp]:

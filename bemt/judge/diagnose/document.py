@@ -9,8 +9,7 @@ import numpy as np
 
 from bemt import __version__
 from bemt.base.tables import or_null, text_table
-from bemt.judge.compare.change_document import families
-from bemt.judge.compare.drive_laws import law
+from bemt.judge.compare.change_document import families, title_of
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import other_rotor
 from bemt.judge.diagnose.answer import bare
@@ -48,7 +47,7 @@ _GUESS = 0.3
 # Level that is said even where no cause shows.
 _WORTH_SAYING = 0.05
 # Lines of an answer, and sentences that are only in its details.
-_LINES, _DETAILS = 12, ("Model: ", "Signature: ")
+_LINES, _DETAILS = 12, ("Model: ", "Signature: ", "Predicting ")
 # Ratios between these are said in percent.
 _PERCENT = (0.5, 2.0)
 
@@ -102,12 +101,19 @@ def document(d: Diagnosis) -> dict[str, Any]:
 
 def _where(w: Location) -> str:
     name, unit, digits = _VARIABLE.get(w.variable, (w.variable, "", 3))
-    sign = "high" if w.size > 0 else "low"
     both = f"{w.low:.{digits}f} to {w.high:.{digits}f}{unit}" if w.high > w.low else f"{w.low:.{digits}f}{unit}"
     error = float(np.hypot(w.size / w.z, w.shared * (1.0 + w.size))) if w.z else float("nan")
-    spread = "" if not np.isfinite(error) else f" +- {max(error, 1e-3):.1%}"
-    most = "of its largest value" if w.variable == "rpm" and w.high > w.low else "of its largest value at that speed"
-    return f"{_CHANNEL[w.channel]} is {sign} by {abs(w.size):.1%}{spread} {most}, at {name} {both}."
+    size, most = w.ratio, ""
+    if not np.isfinite(size) or size * w.size <= 0.0:  # loads near zero have no ratio
+        size, most = w.size, " of its largest value"
+        most += "" if w.variable == "rpm" and w.high > w.low else " at that speed"
+    error = max(abs(error * size / w.size), 1e-3) if w.size else error
+    spread = f" ± {100.0 * error:.1f}" if np.isfinite(error) else ""
+    way = "high" if size > 0 else "low"
+    told = f"{way} by {100.0 * abs(size):.1f}{spread} %{most}"
+    if not most and not _PERCENT[0] < 1.0 + size < _PERCENT[1]:
+        told = f"{_share(size)} of what the case gives"
+    return f"{_CHANNEL[w.channel]} is {told}, at {name} {both}."
 
 
 def _unexplained(d: Diagnosis) -> list[str]:
@@ -152,7 +158,7 @@ def _parameters(d: Diagnosis) -> str:
                 words.append(f"{k} {v.value}{_odds(v)}")
         words += [f"{' and '.join(left)} not determined"] if left else []
         if words:
-            each.append((f"{i} " if len(d.parameters) > 1 else "") + ", ".join(words))
+            each.append((f"{title_of(i)}: " if len(d.parameters) > 1 else "") + ", ".join(words))
     return "; ".join(each)
 
 
@@ -172,7 +178,7 @@ def _with_size(d: Diagnosis, name: str) -> str:
     """Title of a named effect and, where one number is its size, that number."""
     cls, found = effects.catalogue().get(name), d.parameters.get(name, {})
     if cls is None:
-        return _title(name)
+        return title_of(name)
     if cls.fault == "unit" and "unit" in found:
         return f"{cls.title} ({found['channel'].value}: {found['unit'].value})"
     sizes = [p for p in cls.parameters if p.off is not None and p.steps and p.name in found]
@@ -237,7 +243,7 @@ def explanation(d: Diagnosis) -> list[str]:
     if decision.verdict in ("named", "sensor"):
         told = _parameters(d)
         lines.append(
-            f"Named: {', '.join(decision.effects)} (probability {decision.probability:.2f})"
+            f"Named: {', '.join(map(title_of, decision.effects))} (probability {decision.probability:.2f})"
             + (f": {told}." if told else ".")
         )
         signs = [catalogue[i].sign for i in decision.effects if i in catalogue and catalogue[i].sign]
@@ -245,8 +251,7 @@ def explanation(d: Diagnosis) -> list[str]:
             lines.append("Signature: " + "; ".join(signs) + ".")
     elif decision.verdict == "class":
         lead = "One of these" if len(decision.sets) < 2 else f"{decision.why[0].upper()}{decision.why[1:]}"
-        large = len(decision.effects) > _A_GROUP
-        members = ", ".join(i if large else f"{i} ({_title(i)})" for i in decision.effects)
+        members = ", ".join(map(title_of, decision.effects))
         lines.append(f"{lead} ({decision.probability:.2f}): {members}.")
     elif decision.verdict == "unknown":
         kernel = d.found.states[0].best_rival
@@ -270,7 +275,7 @@ def _next(d: Diagnosis) -> list[str]:
         cost = f" About {step.minutes:.0f} minutes; expected to settle {step.gain:.0%} of what is open."
     case = "if nothing is wrong with it" if step.kind in ("mend", "case") else "without such a reference"
     other = [] if step.otherwise is None or step.kind == "run" else [f"  {case}: {step.otherwise.text}"]
-    unless = [f"  if {step.checks} is ruled out:"] if step.checks and step.commands else []
+    unless = [f"  if {title_of(step.checks)} is ruled out:"] if step.checks and step.commands else []
     return [f"Next: {step.text}{step.tells}.{cost}", *unless, *(f"  {c}" for c in step.commands), *other]
 
 
@@ -278,17 +283,9 @@ def _not_tried(d: Diagnosis) -> list[str]:
     """Effects that could not be tried, by reason, in one line."""
     reasons: dict[str, list[str]] = {}
     for name, why in d.absent.items():
-        reasons.setdefault(why, []).append(name)
+        reasons.setdefault(why, []).append(title_of(name))
     words = [f"{', '.join(names)} ({why})" for why, names in reasons.items()]
     return [f"Not tried: {'; '.join(words)}."] if words else []
-
-
-def _title(name: str) -> str:
-    """Title of a cause; of one that only the comparison knows, that of its scaling law."""
-    if name in effects.catalogue():
-        return effects.catalogue()[name].title
-    row = law(name)
-    return name if row is None else row.title
 
 
 def headline(d: Diagnosis) -> str:
@@ -322,11 +319,11 @@ def headline(d: Diagnosis) -> str:
 
 def _of_class(said: Decision) -> str:
     """What is said of a class."""
-    titles = [_title(i) for i in said.effects]
+    titles = [title_of(i) for i in said.effects]
     if said.beside:
         return f"Cause found: {titles[0]}. Possibly also: {' or '.join(titles[1:])}"
     if len(said.sets) > 1:
-        each = [" / ".join(map(_title, s)) for s in said.sets]
+        each = [" / ".join(map(title_of, s)) for s in said.sets]
         return f"Two causes: {' and '.join(f'one of ({w})' if ' / ' in w else w for w in each)}"
     if len(titles) > _A_GROUP:
         return f"{len(titles)} causes look alike in these readings: {families(said.effects)}"
@@ -343,7 +340,7 @@ def _in_both(d: Diagnosis) -> str:
     """What the case leaves out and the reference shows as well, of the effects that are claimed."""
     if not d.in_reference:
         return ""
-    which = "it" if len(d.said.effects) == 1 else " and ".join(_title(i) for i in d.in_reference)
+    which = "it" if len(d.said.effects) == 1 else " and ".join(title_of(i) for i in d.in_reference)
     return f"; the case leaves {which} out, and the reference shows it as well"
 
 
@@ -352,7 +349,7 @@ def _guess(d: Diagnosis) -> str:
     chance = d.found.probability.get(Explanation.of(*d.best.ids), 0.0) if d.best.ids else 0.0
     if chance < max(_GUESS, d.found.probability[UNKNOWN], d.found.probability[NONE]):
         return ""
-    return f"; {' and '.join(_title(i) for i in d.best.ids)} is likeliest ({chance:.2f}), too little to be named"
+    return f"; {' and '.join(title_of(i) for i in d.best.ids)} is likeliest ({chance:.2f}), too little to be named"
 
 
 def _ratios(d: Diagnosis) -> list[tuple[str, float]]:

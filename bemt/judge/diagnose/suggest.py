@@ -16,7 +16,7 @@ from bemt.base.gaussian.whitening import whitener
 from bemt.base.units import ZERO_CELSIUS, suffixes
 from bemt.data.readers.recording_toml import QUANTITIES
 from bemt.data.recordings.shown import options_of
-from bemt.judge.compare.change_document import AIR_OF_BOTH, DAYS
+from bemt.judge.compare.change_document import AIR_OF_BOTH, DAYS, title_of
 from bemt.judge.diagnose import noise
 from bemt.judge.diagnose.assemble import assemble
 from bemt.judge.diagnose.form import ALIKE
@@ -134,7 +134,7 @@ class Suggestion:
         if not self.separates:
             return ""
         both = f"{self.after:.1f} instead of {self.before:.1f}"
-        return f" (tells {' from '.join(self.separates)} at {both} standard deviations)"
+        return f" (tells {' from '.join(map(title_of, self.separates))} at {both} standard deviations)"
 
     def document(self) -> Mapping[str, object]:
         """Plain values for JSON."""
@@ -426,7 +426,7 @@ def look(names: Sequence[str], record: Record) -> Suggestion | None:
     if not aims:
         return None
     check, aim, name = min(aims, key=lambda one: effects.catalogue()[one[2]].check_minutes)
-    return Suggestion(f"to {aim} {name}, {check}", (), (), 0.0, 0.0, "look", checks=name,
+    return Suggestion(f"to {aim} {title_of(name)}, {check}", (), (), 0.0, 0.0, "look", checks=name,
                       minutes=effects.catalogue()[name].check_minutes)  # fmt: skip
 
 

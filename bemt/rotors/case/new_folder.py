@@ -38,6 +38,7 @@ class Wanted:
     campaign: bool = False
     reading: str | None = None
     inches: bool = False  # The diameter was given so
+    name: str = ""  # Of the case, where it is given beside the label
 
     @property
     def motor(self) -> tuple[float, int] | None:
@@ -87,7 +88,10 @@ def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str], list
     if wanted.campaign:
         files["cfd/campaign.toml"] = _CAMPAIGN.format(name=case.name, rpm=case.rpm, V=case.airspeed_m_s).encode()
     folder = Path(out) if out else Path(case.name)
-    write_files(files, folder)
+    if not _as_written(wanted, folder):
+        own = wanted.motor is not None and (folder / "case.toml").is_file()
+        free_folder(folder, f", and copy its [drive] into {(folder / 'case.toml').as_posix()}" if own else "")
+    _put(files, folder)
     open_ = [item for item in case.assumptions if item.key.partition(".")[0] in ("rotor", "duct", "blade")]
     told = [f"{item.key.rpartition('.')[2]} {item.nominal:.3g}" for item in open_
             if isinstance(item.nominal, int | float)]  # fmt: skip
@@ -134,16 +138,30 @@ def companions(case: Case) -> dict[str, bytes]:
     return {name: (case.folder / name).read_bytes() for name in names}
 
 
-def free_folder(folder: Path) -> None:
-    """Refuse a folder that holds something."""
+def free_folder(folder: Path, otherwise: str = "") -> None:
+    """Refuse a folder that holds something; `otherwise`: what helps beside another one."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         got = f"a {'folder' if folder.is_dir() else 'file'} that already exists"
-        raise InputError(Fault(folder.as_posix(), "", got, "a new folder", "Choose --out DIR"))
+        raise InputError(Fault(folder.as_posix(), "", got, "a new folder", f"Choose --out DIR{otherwise}"))
+
+
+def _as_written(wanted: Wanted, folder: Path) -> bool:
+    """Whether a folder holds the same case without its motor, as this command wrote it: it may get one."""
+    if wanted.motor is None or not folder.is_dir():
+        return False
+    before = _files(replace(wanted, kv=None, cells=None))
+    there = {p.relative_to(folder).as_posix(): p for p in folder.rglob("*") if p.is_file()}
+    return there.keys() == before.keys() and all(there[name].read_bytes() == before[name] for name in before)
 
 
 def write_files(files: Mapping[str, bytes], folder: Path) -> None:
-    """Write the files of a case into a new folder; case.toml last, so that what it names is there."""
+    """Write the files of a case into a new folder."""
     free_folder(folder)
+    _put(files, folder)
+
+
+def _put(files: Mapping[str, bytes], folder: Path) -> None:
+    """Write files; case.toml last, so that what it names is there."""
     for name in sorted(files, key=lambda name: name == "case.toml"):
         write_atomic(folder / name, files[name])
 
@@ -223,7 +241,7 @@ def _called(w: Wanted, text: str) -> str:
     """Case file with the name that the user gave it."""
     given = w.label or ""
     sized = w.fan and w.diameter_mm is not None
-    name = fresh.case_name(given) if given and (sized or fresh.own_name(given)) else ""
+    name = fresh.case_name(w.name or given) if w.name or (given and (sized or fresh.own_name(given))) else ""
     return re.sub(r'^name = ".*"$', f'name = "{name}"', text, count=1, flags=re.M) if name else text
 
 

@@ -241,7 +241,7 @@ class Export(ABC):
             write_atomic(path, data)
             if str(data)[:2] == "#!":
                 os.chmod(path, 0o755)
-        return {"schema": SCHEMA, "name": job.case.name, "files": [], "targets": [made]}
+        return {"schema": SCHEMA, "name": job.case.name, "targets": [made]}
 
     def text(self, part: Mapping[str, Any]) -> list[str]:
         """Lines for a terminal on its own part of the manifest, what that holds under `id`."""
@@ -357,22 +357,18 @@ class LoadsExport(Export):
         V = J * rpm / 60.0 * table.diameter_m
         truth = solve_points(job.case, rpm, V)
         got = self.loads(files, rpm, V)
-        static = J == 0.0
-        top: dict[float, tuple[float, float]] = {
-            n: (float(np.max(truth.thrust_N[rpm == n])), float(np.max(truth.torque_Nm[rpm == n]))) for n in set(rpm)
-        }
-        errors: dict[str, object] = {}
-        for i, (name, value, exact) in enumerate(
-            (("thrust", got[0], truth.thrust_N), ("torque", got[1], truth.torque_Nm))
-        ):
-            share = 100.0 * np.abs(value - exact) / np.array([top[n][i] for n in rpm])
+        static, errors = J == 0.0, dict[str, object]()
+        for name, value, exact in zip(("thrust", "torque"), got, (truth.thrust_N, truth.torque_Nm), strict=True):
+            off = 100.0 * np.abs(value - exact)
+            share = off / np.array([exact[rpm == n].max() for n in rpm])
             errors[name] = {
-                "at_rest": _worst(share[static]),
+                "at_rest": _worst((off / exact)[static]),
                 "flight": _worst(share),
                 "flight_upper_half_of_rpm": _worst(share[rpm >= 0.5 * table.rpm[-1]]),
             }
         return {
-            "fit_error_pct": errors | {"of": "the greatest load at the same rpm", "points": int(rpm.size)},
+            "fit_error_pct": errors
+            | {"of": "the greatest load at the same rpm; at rest the load itself", "points": int(rpm.size)},
             "oblique_error_pct": self.hub_checked(job, files),
             "band": job.band.document(),
             "range": table.range_document(),

@@ -186,7 +186,8 @@ def _kept(before: Manifest, old: ManifestContents, gone: set[str], out: Path) ->
 
     kept = {key: value for key, value in before.items() if key not in ("files", "targets", "case_sha256", *old.parts)}
     kept |= {word: before[word] for word, files in old.parts.items() if word not in gone and there(files)}
-    kept["files"] = [item for item, file in zip(before.get("files", []), old.files, strict=True) if stays(file)]
+    files = [item for item, file in zip(before.get("files", []), old.files, strict=True) if stays(file)]
+    kept |= {"files": files} if files else {}
     targets = [
         item
         for item, one in zip(before.get("targets", []), old.targets, strict=True)
@@ -330,7 +331,8 @@ def _errors_text(error: Mapping[str, Any]) -> list[str]:
     for at, words in (("at_rest", " at rest"), ("flight", ", flight included")) if parted else (("", ""),):
         worst = {w: v.get(at) if isinstance(v := error.get(w), dict) else v for w in ("thrust", "torque")}
         told = (f"{w} {'not held' if v is None else number_text(v, 3) + ' %'}" for w, v in worst.items())
-        lines.append(f"  greatest error{words}: {', '.join(told)} (of {error['of']})")
+        of = "the load itself" if at == "at_rest" else error["of"]
+        lines.append(f"  greatest error{words}: {', '.join(told)} (of {of})")
     return lines
 
 

@@ -162,7 +162,7 @@ def header(job: Job, title: str) -> list[str]:
     table = job.performance
     return [
         f"{title}: {job.case.name}, written by bemt {__version__}",
-        f"{table.rpm[0]:.6g} to {table.rpm[-1]:.6g} rev/min, J {table.J[0]:.4g} to {table.J[-1]:.4g}, "
+        f"{table.rpm[0]:.6g} to {table.rpm[-1]:.6g} rev/min, J 0 to {table.J_zero.max():.4g}, "
         f"density {table.rho:.6g} kg/m3; fit error, band and range: manifest.json",
     ]
 
@@ -313,7 +313,7 @@ def _lost(export: Export, job: Job) -> list[str]:
     if {"windmill", "reynolds"} <= export.features:
         t = job.performance
         out.append(
-            f"the table covers each speed up to {t.range_document()['airspeed_m_s_greatest']:.3g} m/s and descent to J "
+            f"the table covers each speed up to {t.fastest_m_s:.3g} m/s and descent to J "
             f"{t.J[0]:.2g}; beyond, the last coefficient is held, so the drag of a windmill stops growing with airspeed"
         )
     return out

@@ -97,8 +97,8 @@ class Performance:
         return int(np.flatnonzero(self.J == 0.0)[0])
 
     def check_points(self) -> tuple[Array, Array]:
-        """Speeds and advance ratios between the nodes, from rest to zero thrust, (P,) each."""
-        rpm = np.sqrt(self.rpm[1:] * self.rpm[:-1])
+        """Ends of the speeds and what lies between the nodes, at advance ratios from rest to zero thrust, (P,) each."""
+        rpm: Array = np.r_[self.rpm[0], np.sqrt(self.rpm[1:] * self.rpm[:-1]), self.rpm[-1]]
         last = np.interp(rpm, self.rpm, self.J_zero)
         share = np.array([0.0, 0.031, 0.13, 0.27, 0.39, 0.52, 0.63, 0.77, 0.89, 0.97])
         return np.repeat(rpm, share.size), (last[:, None] * share).ravel()
@@ -114,16 +114,29 @@ class Performance:
         rpm_, V = np.asarray(rpm, dtype=float), np.asarray(airspeed_m_s, dtype=float)
         return table_loads(self.rpm, self.J, self.CT, self.CP, self.rho, self.diameter_m, rpm_, V)
 
+    @property
+    def fastest_m_s(self) -> float:
+        """Greatest airspeed that each speed of the table is made for. [m/s]"""
+        return float(DIVE * self.J_zero.max() * self.rpm[-1] / 60.0 * self.diameter_m)
+
+    @property
+    def greatest(self) -> tuple[float, float]:
+        """Greatest thrust [N] and torque [N m] up to that airspeed; nodes of a table beyond it are no flight."""
+        airspeed = np.outer(self.rpm / 60.0 * self.diameter_m, self.J)
+        met = airspeed <= self.fastest_m_s * (1.0 + 1e-9)
+        return float(np.abs(self.thrust_N[met]).max()), float(np.abs(self.torque_Nm[met]).max())
+
     def range_document(self) -> dict[str, Any]:
-        """Where the table holds, for the manifest."""
+        """Where the rotor flies and the table reaches, for the manifest."""
         n = self.rpm / 60.0
         return {
-            "rpm": [float(self.rpm[0]), float(self.rpm[-1])], "J": [float(self.J[0]), float(self.J[-1])],
+            "rpm": [float(self.rpm[0]), float(self.rpm[-1])], "J": [0.0, float(self.J_zero.max())],
+            "J_of_table": [float(self.J[0]), float(self.J[-1])],
             "J_zero_thrust": [float(self.J_zero[0]), float(self.J_zero[-1])],
             "airspeed_m_s_of_zero_thrust_at_greatest_rpm": float(self.J_zero[-1] * n[-1] * self.diameter_m),
             "tip_mach_greatest": float(np.pi * n[-1] * self.diameter_m / self.a_sound),
             "density_kg_m3": self.rho, "diameter_m": self.diameter_m,
-            "airspeed_m_s_greatest": float(self.J[-1] * n[0] * self.diameter_m),
+            "airspeed_m_s_greatest": self.fastest_m_s,
             "flight": "J from 0 to zero thrust; axial flow, steady; doubtful in descent and as a windmill",
         }  # fmt: skip
 

@@ -34,7 +34,7 @@ class GazeboExport(LoadsExport):
     source = "gz-sim MulticopterMotorModel.cc; rotors_simulator gazebo_motor_model.cpp"
     told = (
         "base, rotor link and joint are a stand: the plugin is what goes into your vehicle",
-        "the constants hold at rest; thrust does not fall with airspeed here: see fit_error_pct.thrust.flight",
+        "the constants are fitted at rest; thrust does not fall with airspeed: see fit_error_pct.thrust.flight",
         "rotorDragCoefficient and rollingMomentCoefficient are fitted in edgewise flow up to the airspeed of zero "
         "thrust; pitch moment, side force and the gain of thrust across the shaft are not in this model",
         "the plugin's rolling moment does not know the direction of rotation: the sign of its coefficient is that "
@@ -275,8 +275,8 @@ class MujocoExport(ModuleExport):
         """MJCF and callback."""
         name = plain_name(job.case.name)
         t = job.performance
-        top_T = 4.0 * float(np.abs(t.thrust_N).max())
-        top_Q = max(4.0 * float(np.abs(t.torque_Nm).max()), 0.5 * t.diameter_m * top_T)
+        top_T, top_Q = (2.0 * load for load in t.greatest)  # room for denser air and a wind across the shaft
+        top_Q = max(top_Q, 0.5 * t.diameter_m * top_T)
         axes = np.eye(6, dtype=int)
         words = ("force_x", "force_y", "thrust", "moment_x", "moment_y", "torque")
         actuators = "\n".join(

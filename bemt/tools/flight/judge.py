@@ -50,6 +50,7 @@ _WIDER, _ODD = 3.0, 0.1  # a vehicle out of the common: factor of its scatter, a
 _UNEVEN = 0.5  # the same of the build, where four vehicles are all that is known (declared) [1]
 _SEEN = 0.5  # faults of a rotor that a speed at its drive or an accelerometer shows (declared) [1]
 _LOADED = 0.5  # flights whose mass, battery or air is another, so their total drive tells nothing (declared) [1]
+_RIVAL = 0.015  # probability from which an explanation is told beside a likelier one [1]
 _OPEN = 0.5  # flights that are of another day, and healthy flights that are of many, where nobody says [1]
 
 
@@ -119,9 +120,9 @@ def judge(
         half = max(own, float(stats.t.ppf(0.975, n - 1 + TOTAL_FREE)) * total_sd(calm))
     cause = beside.change.causes if beside.change is not None else ()
     out = FlightVerdict(
-        sure.said, change - change.mean(), next_flight(sure.said, layout, n), sure.found, sure.P, sure.scatter,
-        _visible(calm, layout, label, day), total=float(change.mean()) if n else float("nan"), total_half=half,
-        given=n, in_flight=bool(sure.said.effects) and set(sure.said.effects) <= set(cause),
+        sure.said, change - change.mean(), next_flight(sure.said, layout, n, day == ""), sure.found, sure.P,
+        sure.scatter, _visible(calm, layout, label, day), total=float(change.mean()) if n else float("nan"),
+        total_half=half, given=n, in_flight=bool(sure.said.effects) and set(sure.said.effects) <= set(cause),
     )  # fmt: skip
     if sure.said.verdict == "none" and out.total_moved:
         step = "weigh the vehicle and charge the battery, then hover 30 s; --healthy-mass-kg, the mass of the " \
@@ -348,15 +349,19 @@ def _said(said: Decision, P: Mapping[Explanation, float], given: int) -> Decisio
         return replace(said, leading=elsewhere, why=why)
     if not given:
         return replace(said, why="no motor stands out by more than in healthy vehicles")
-    likely = sorted(P.items(), key=lambda kv: -kv[1])
-    first, share = likely[0][0], f"{100.0 * likely[0][1]:.0f} %"
-    if first == NONE:
-        return replace(said, why=f"most likely ({share}) flights merely differ so, but that is not sure enough")
-    if first == UNKNOWN:
-        why = f"the balance moved, most likely ({share}) as no listed cause moves it, but that is not sure enough"
-        return replace(said, why=why)
-    named = [f"{' and '.join(e)} ({100.0 * p:.0f} %)".replace(", motor ", " at motor ") for e, p in likely if e.ids]
-    return replace(said, why=f"several causes fit, none well enough: {', '.join(named[:3])}")
+    likely = sorted((k for k in P if P[k] > _RIVAL), key=lambda k: -P[k])[:4]
+    told = [f"{_words(k)} ({100.0 * P[k]:.0f} %)" for k in likely]
+    why = f"several explanations fit, none well enough: {', '.join(told)}"
+    if P[likely[0]] > 0.5:
+        why = ": ".join([f"most likely {told[0]}, but that is not sure enough", ", ".join(told[1:])]).rstrip(": ")
+    return replace(said, leading=likely[0], why=why)
+
+
+def _words(e: Explanation) -> str:
+    """An explanation in a sentence."""
+    if e in (NONE, UNKNOWN):
+        return "flights merely differ so" if e == NONE else "a cause that is not listed"
+    return " and ".join(e).replace(", motor ", " at motor ")
 
 
 def _claimed(said: Decision, faults: Sequence[str]) -> Decision:
@@ -374,16 +379,23 @@ def _claimed(said: Decision, faults: Sequence[str]) -> Decision:
 _HOVER = "hover 30 s in still air and judge that flight"
 
 
-def next_flight(said: Decision, layout: NDArray[np.float64] | None, given: int) -> Suggestion:
-    """Choose the next step after a decision that compared with so many `given` healthy flights."""
-    motors = [int(i.removeprefix(BLADE)) for i in said.effects if i.startswith(BLADE) and i[len(BLADE) :].isdigit()]
+def next_flight(said: Decision, layout: NDArray[np.float64] | None, given: int, ask_day: bool = False) -> Suggestion:
+    """Choose the next step after a decision that compared with so many `given` healthy flights.
+
+    `ask_day`: nobody knows whether the flight is of their day.
+    """
+    # Where nothing is sure, what is likelier than all else is still the first to look at.
+    open_ = said.verdict == "insufficient" and said.probability < 0.5
+    causes = tuple(said.leading) if open_ else said.effects
+    motors = [int(i.removeprefix(BLADE)) for i in causes if i.startswith(BLADE) and i[len(BLADE) :].isdigit()]
     several = "s" if len(motors) > 1 else ""
     looked = f"look at the propeller{several} of motor{several} {' and '.join(map(str, motors))}"
-    text, kind = _flight_needed(said, given, looked if motors else "") or _look_needed(said, motors, looked, layout)
+    needed = _flight_needed(said, given, looked if motors else "", ask_day)
+    text, kind = needed or _look_needed(said, motors, looked, layout)
     return Suggestion(text, (), said.effects[:2], 0.0, 0.0, kind)
 
 
-def _flight_needed(said: Decision, given: int, looked: str) -> tuple[str, str] | None:
+def _flight_needed(said: Decision, given: int, looked: str, ask_day: bool) -> tuple[str, str] | None:
     """Step and its kind where another flight, or none, is what is needed; None where the vehicle is to be looked at."""
     if said.verdict == "none":
         return "no further flight is needed; more healthy flights with --healthy would show smaller damage", ""
@@ -396,7 +408,10 @@ def _flight_needed(said: Decision, given: int, looked: str) -> tuple[str, str] |
         text = "three or more healthy flights of this vehicle, in still air, with --healthy"
         return f"{looked}, and give {text}" if looked else text, "reference"
     if said.verdict in ("unknown", "insufficient"):
-        return f"{_HOVER}; check arms, motor tilt and propellers by hand", "run"
+        day = "say whether it was flown on the day of the healthy flights (--healthy-day same or other); " \
+            if ask_day else ""  # fmt: skip
+        check = f"{looked}, and {_HOVER}" if looked else f"{_HOVER}; check arms, motor tilt and propellers by hand"
+        return day + check, "run"
     return None
 
 

@@ -49,7 +49,12 @@ def text(a: FlightAnswer, details: bool = False) -> str:
     if j.said.verdict == "none" and j.healthy:
         lines.append("  Not visible in this log: smaller damage; tape and imbalance without fast accelerometer data.")
     lines += _seen(a)
-    lines += _details(a) if details else ["", "Constants, and what the log cannot show: --details, --json."]
+    if details:
+        return "\n".join(lines + _details(a))
+    # Who states the mass asks for the constants.
+    weighed = [] if any(c.unit.endswith("/kg") for c in a.simulator.values()) else _constants(a)
+    more = "More constants" if weighed else "Constants"
+    lines += [*weighed, "", f"{more}, and what the log cannot show: --details, --json."]
     return "\n".join(lines)
 
 
@@ -64,14 +69,21 @@ def _details(a: FlightAnswer) -> list[str]:
         k, u = a.predicted.constant, a.predicted.u
         lines.append(f"  {'thrust constant of the case':<34} {k:.4g} ± {2 * u:.2g} N/rpm^2 (two standard deviations)")
     lines += _flow(a)
-    if a.curve:
-        lines += ["", "For the autopilot (± 95 %)"]
-        lines += [f"  {name:<34} {_number(c)}" for name, c in a.curve.items()]
-    if a.simulator:
-        lines += ["", "For a simulator (± 95 %; thrust: of another flight of this vehicle)"]
-        lines += [f"  {name:<34} {_number(c)}" for name, c in a.simulator.items()]
+    lines += _constants(a)
     lines += ["", "Not visible here"] if a.unseen else []
     return lines + [f"  {u}" for u in a.unseen]
+
+
+def _constants(a: FlightAnswer) -> list[str]:
+    """What goes into an autopilot and a simulator."""
+    lines = []
+    if a.curve:
+        lines += ["", "For the autopilot (± 95 %; throttle after its thrust curve, as a share of full thrust)"]
+        lines += [f"  {name:<34} {_number(c)}" for name, c in a.curve.items()]
+    if a.simulator:
+        lines += ["", "For a simulator (± 95 %; thrust: of another flight of this vehicle; command before that curve)"]
+        lines += [f"  {name:<34} {_number(c)}" for name, c in a.simulator.items()]
+    return lines
 
 
 def pilot(a: FlightAnswer) -> list[str]:

@@ -176,9 +176,9 @@ _SLOWEST_S, _LEAST_SEEN = 0.5, 0.5  # longest lag tried [s]; share of the varian
 def simulator_constants(log: FlightLog, found: Identified) -> dict[str, Constant]:
     """Constants in the units of simulators, those that the flight shows.
 
-    Thrust constant [N/(rad/s)^2], hover speed [rad/s], hover command, torque constant over yaw inertia
-    [(rad/s^2)/(rad/s)^2], motor time constant [s]. The band of the thrust constant holds what flights of one vehicle
-    differ by; the others are of this flight.
+    Thrust constant [N/(rad/s)^2], the speed at which it carries the weight in still air [rad/s], mean command, torque
+    constant over yaw inertia [(rad/s^2)/(rad/s)^2], motor time constant [s]. The band of the thrust constant holds what
+    flights of one vehicle differ by; the others are of this flight.
     """
     out: dict[str, Constant] = {}
     sd, factor = flight_scatter([])
@@ -186,10 +186,10 @@ def simulator_constants(log: FlightLog, found: Identified) -> dict[str, Constant
         if (k := found.constants.get(name)) is not None:
             half = float(np.hypot(k.half, factor * sd * k.value))
             out[name] = Constant(scale * k.value, scale * half, k.unit.replace("rpm^2", "(rad/s)^2"))
-    if log.rpm is not None and "mean rpm" in found.rotors:
-        speed = np.sqrt(np.mean(log.rpm[log.flying] ** 2, axis=1))
-        blocks = np.array([b.mean() for b in np.array_split(speed, BATCHES)])
-        out["hover speed"] = Constant(_RAD_S * float(speed.mean()), _RAD_S * half_width(blocks), "rad/s")
+    if log.rpm is not None and (k := found.weight_per_drive) is not None:
+        # The speed that carries the weight with this constant; in flight tilt, climbs and air across the disks move it.
+        hover = _RAD_S * float(np.sqrt(G0 / (log.rotors * k.value)))
+        out["hover speed"] = Constant(hover, 0.5 * hover * k.half / k.value, "rad/s")
     if "hover command" in found.constants:
         out["hover command"] = found.constants["hover command"]
     yaw = found.constants.get("torque constant over yaw inertia")
