@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 SCHEMA = "bemt.diagnosis/1"
 
 _CHANNEL = {"thrust_N": "Thrust", "torque_Nm": "Torque", "rpm": "Speed of rotation"}
+_BY_POWER = {**_CHANNEL, "torque_Nm": "Electrical power"}
 # Share of a parameter's range that its interval may take before nothing is said of it [1].
 _OPEN = 0.95
 _VARIABLE = {
@@ -99,7 +101,12 @@ def document(d: Diagnosis) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _where(w: Location) -> str:
+def _words(d: Diagnosis) -> Mapping[str, str]:
+    """What each channel is called: electrical power where that is all that stands for a torque."""
+    return _BY_POWER if any(p.record.electrical for p in d.problem.parts) else _CHANNEL
+
+
+def _where(w: Location, words: Mapping[str, str]) -> str:
     name, unit, digits = _VARIABLE.get(w.variable, (w.variable, "", 3))
     both = f"{w.low:.{digits}f} to {w.high:.{digits}f}{unit}" if w.high > w.low else f"{w.low:.{digits}f}{unit}"
     error = float(np.hypot(w.size / w.z, w.shared * (1.0 + w.size))) if w.z else float("nan")
@@ -113,7 +120,7 @@ def _where(w: Location) -> str:
     told = f"{way} by {100.0 * abs(size):.1f}{spread} %{most}"
     if not most and not _PERCENT[0] < 1.0 + size < _PERCENT[1]:
         told = f"{_share(size)} of what the case gives"
-    return f"{_CHANNEL[w.channel]} is {told}, at {name} {both}."
+    return f"{words[w.channel]} is {told}, at {name} {both}."
 
 
 def _unexplained(d: Diagnosis) -> list[str]:
@@ -123,9 +130,9 @@ def _unexplained(d: Diagnosis) -> list[str]:
     sign and even its channel may be those of something that the recording does not show.
     """
     seen, rest = bare(d.found), d.where
-    lines = [_where(seen)]
+    lines = [_where(seen, _words(d))]
     if (seen.channel, seen.size > 0) != (rest.channel, rest.size > 0):
-        words = _where(rest)
+        words = _where(rest, _words(d))
         lines.append(f"Beyond the uncertainty of gains, blade angle and solver: {words[0].lower()}{words[1:]}")
     return lines
 
@@ -135,7 +142,7 @@ def _gain(d: Diagnosis) -> str:
     for channel, s in d.scores.items():
         most = s["largest"] or 1.0
         words.append(
-            f"{_CHANNEL[channel].lower()} {s['holdout_before'] / most:.1%} before, {s['holdout_after'] / most:.1%} "
+            f"{_words(d)[channel].lower()} {s['holdout_before'] / most:.1%} before, {s['holdout_after'] / most:.1%} "
             f"after (noise {s['noise'] / most:.1%}, smooth fit without physics {s['gp_only'] / most:.1%})"
         )
     head = f"Predicting {d.blocks} it was not fitted to, the error in % of the largest value is: "
@@ -218,12 +225,12 @@ def explanation(d: Diagnosis) -> list[str]:
     lines += [f"Model: {words}." for words in d.problem.validity]
     stated = d.problem.blade.moved
     if any(abs(v) > LEVEL for v in stated.values()):
-        off = " and ".join(f"{_CHANNEL[c].lower()} {_share(v)}" for c, v in stated.items())
+        off = " and ".join(f"{_words(d)[c].lower()} {_share(v)}" for c, v in stated.items())
         lines.append(f"The reference is off the case as stated by {off}; the blade was fitted to it. Are diameter, "
                      "pitch and blades of the case right?")  # fmt: skip
     level = d.problem.level
     off = " and ".join(
-        f"{_CHANNEL[c].lower()} by {_share(v) if abs(v) > 1.0 else f'{v:+.0%}'}" for c, v in level.items()
+        f"{_words(d)[c].lower()} by {_share(v) if abs(v) > 1.0 else f'{v:+.0%}'}" for c, v in level.items()
     )
     alone, doubted = d.problem.free.all(), other_rotor.doubted(d.problem, decision)
     open_ = alone and decision.verdict in ("insufficient", "unknown") and not d.problem.findings
@@ -239,7 +246,7 @@ def explanation(d: Diagnosis) -> list[str]:
             lines.append(f"The level is off ({off}), within what gain, blade angle and solver allow; no cause shows.")
         return [*lines, _gain(d), *_next(d), *_not_tried(d)]
     known = decision.verdict not in ("unknown", "insufficient") or doubted
-    lines += [_where(d.where)] if known else _unexplained(d)
+    lines += [_where(d.where, _words(d))] if known else _unexplained(d)
     if decision.verdict in ("named", "sensor"):
         told = _parameters(d)
         lines.append(
@@ -332,7 +339,7 @@ def _of_class(said: Decision) -> str:
 
 def _off(d: Diagnosis) -> str:
     """By how much each channel differs from the case."""
-    words = (f"{_CHANNEL[c].lower()} {'up to ' if wide else ''}{_share(v)}" for c, (v, wide) in d.off.items())
+    words = (f"{_words(d)[c].lower()} {'up to ' if wide else ''}{_share(v)}" for c, (v, wide) in d.off.items())
     return " and ".join(words)
 
 
@@ -356,7 +363,9 @@ def _ratios(d: Diagnosis) -> list[tuple[str, float]]:
     """Loads of the recording over those of the reference at equal speed, less 1; none where they were not compared."""
     if d.change is None:
         return []
-    return [(c.name, d.change.ratios[c.channel].ratio - 1.0) for c in d.change.loads_by_name.values()]
+    said = {"electrical_power_W": "electrical power"}
+    ratios = ((said.get(c.channel, c.name), d.change.ratios[c.channel]) for c in d.change.loads_by_name.values())
+    return [(name, r.ratio - 1.0) for name, r in ratios]
 
 
 def _from_reference(d: Diagnosis) -> str:
