@@ -25,7 +25,6 @@ pytestmark = pytest.mark.slow
 DIAGNOSED = tuple(i for i, cls in effects.catalogue().items() if cls.diagnosed)
 NULLS, SHARE = 300, 0.02
 MISSED = {
-    "mounted_backwards": "only twelve pairs pay for the errors of their laws: others with it lead it by 18 nats",
     "rpm_scale": "of median size, six times; a factor of three is told by the level alone: doubt 0.57, this 0.43",
     "unit_slip": "of median size, m/s taken for mph: thrust 0.27 times, and that level knows no airspeed; doubt 0.85",
 }

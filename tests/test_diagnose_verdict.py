@@ -64,6 +64,12 @@ def test_the_nearest_signature_is_a_baseline_of_its_own(answer: chain.Diagnosis)
     assert form.nearest(answer.found) == "compressibility"
 
 
+def test_a_cause_of_half_of_the_thrust_is_not_outdone_by_pairs_with_it() -> None:
+    """All of its forty pairs lead; each pays for the errors of its laws as the cause alone does."""
+    backwards = effects.catalogue()["mounted_backwards"](drag=2.0)
+    assert diagnose(recording(case(), points("grid"), (backwards,)), case()).decision.effects == ("mounted_backwards",)
+
+
 def test_references_are_in_no_block() -> None:
     rpm = np.repeat([4000.0, 6000.0, 8000.0, 10000.0], 3)
     covariates = {"rpm": rpm, "J": np.tile([0.0, 0.3, 0.6], 4), "run": np.zeros(12)}

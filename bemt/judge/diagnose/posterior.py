@@ -287,7 +287,7 @@ def _single(bank: _Bank, h: Hyper, white: Conditional) -> State:
 
 
 def _pairs(bank: _Bank, state: State) -> None:
-    """Evidence of two effects at a time, signatures added; the errors of both laws for the leading ones."""
+    """Evidence of two effects at a time, signatures added; the errors of both laws where they lead or count."""
     none, some = state.log_z[NONE], {}
     gain = state.S.T @ state.r - state.half
     for name, span in bank.spans.items():
@@ -311,7 +311,10 @@ def _pairs(bank: _Bank, state: State) -> None:
     def most(pair: Explanation) -> float:
         return max(state.log_z[pair], *(state.log_z[Explanation.of(i)] for i in pair.ids))
 
-    for pair in sorted(tables, key=most, reverse=True)[:_PAIRS]:
+    for k, pair in enumerate(sorted(tables, key=most, reverse=True)):
+        better = max(state.log_z[Explanation.of(i)] for i in pair.ids)
+        if k >= _PAIRS and state.log_z[pair] < better + EARNED:  # it counts as the better one as it is
+            continue
         a, b, total = tables[pair]
         A, B = some[a][0], some[b][0]
         i, j = np.unravel_index(int(np.argmax(total)), total.shape)
