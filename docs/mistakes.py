@@ -58,7 +58,8 @@ def answer(name: str) -> str:
         shown = said
     else:  # the answer runs over several lines
         hits = [line for line in lines if any(word in line for word in words)]
-        shown = " ".join([line for line in hits if line.startswith("!")] or hits[:3])
+        marked = [[line for line in hits if line.startswith(mark)] for mark in ("!", ". ")]
+        shown = " ".join(next(filter(None, marked), hits[:3]))
     shown = re.sub(r"(expected one of (?:[\w./-]+, ){3})(?:[\w./-]+, )+[\w./-]+", r"\1...", shown)
     assert code in (0, 2)
     fine = " (0)" if code == 0 else ""
