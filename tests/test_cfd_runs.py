@@ -407,7 +407,7 @@ def test_several_runs_are_no_run(put: Callable[..., Path], capsys: pytest.Captur
         put(f"of_{n}/postProcessing/forces/0/force.dat", head + rows)
     assert main(["import", "of_6000", "of_8000", "of_10000"]) == 2
     said = capsys.readouterr()
-    assert not said.out and said.err.count("Several runs?") == 1 == len(said.err.splitlines())
+    assert not said.out and said.err.count("Other runs: import each") == 1 == len(said.err.splitlines())
 
 
 def test_a_unit_or_a_sign_that_no_rotor_has_is_said(
@@ -642,7 +642,7 @@ def test_the_shared_exports_become_runs(shared_data: Path) -> None:
     sphere = {"files": ("openfoam_old/0/forces.dat", "openfoam_old/100/forces.dat"), "rpm": 100.0, "axis": "x"}
     with pytest.raises(InputError, match="a run that has converged"):  # two starts of one history, joined
         assemble(RunToml.model_validate({"run": sphere}), folder)
-    with pytest.raises(InputError, match="another clock"):
+    with pytest.raises(InputError, match="from the same start"):
         files = ("screw/report-def-0-rfile.out", "screw/report-def-0-rfile_1_1.out")
         assemble(RunToml.model_validate({"run": {"files": files, "rpm": 130.2}, **screw}), folder)
 
