@@ -544,7 +544,7 @@ def test_command_writes_two_files_and_says_so(
     monkeypatch: pytest.MonkeyPatch,
     made: tuple[Book, Path],
 ) -> None:
-    monkeypatch.setattr("bemt.results.report.gather.gather", lambda paths, out, progress: made[0])
+    monkeypatch.setattr("bemt.results.report.gather.gather", lambda paths, out, progress, recordings: made[0])
     assert main(["report", str(made[1] / "cases"), "--out", str(tmp_path / "r")]) == 2
     assert sorted(p.name for p in (tmp_path / "r").iterdir()) == ["report.html", "report.md"]
     assert "report.html" in capsys.readouterr().out

@@ -152,6 +152,7 @@ def new(
     >>> import tempfile
     >>> print(new("10x5", out=tempfile.mkdtemp() + "/mine").text)  # doctest: +ELLIPSIS
     /.../mine: case.toml
+    ! no ending (BN, E, F, MR, SF): ...
     next: bemt sweep /.../mine
     """
     import os

@@ -97,9 +97,8 @@ def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
     again = asked.command(b="A_AGAIN.csv", rows_b=asked.rows_a, air_b=asked.air_a)
     order = checks_by_worth(said.ranked, minutes("reference", len(change.a.points)))
     firsts: dict[str, str] = {}
-    for cause in [*order, *checks]:  # the quickest of each family
-        if cause in checks or said.verdict != "class":
-            firsts.setdefault(FAMILY.get(cause, cause), _check(cause) if cause else _REPEAT)
+    for cause in [k for k in order if k in checks or said.verdict != "class"] or checks:  # the quickest of each family
+        firsts.setdefault(FAMILY.get(cause, cause), _check(cause) if cause else _REPEAT)
     told = [*firsts.values()][:_STEPS] or [_REPEAT]
     return {"text": "; or ".join(told), "command": again if told[0] == _REPEAT else with_case}
 
