@@ -148,8 +148,8 @@ def worded(function: Callable[P, T]) -> Callable[P, T]:
 def cells_of(value: Any) -> Any:
     """Cells in series of a battery as people write them; what is none stays, to be refused.
 
-    >>> [cells_of(value) for value in ("3S", "4", 6, "3x")]
-    [3, 4, 6, '3x']
+    >>> tuple(cells_of(value) for value in ("3S", "4", 6, "3x"))
+    (3, 4, 6, '3x')
     """
     found = re.fullmatch(r"\s*(\d+)\s*[sS]?\s*", value) if isinstance(value, str) else None
     return int(found[1]) if found else value

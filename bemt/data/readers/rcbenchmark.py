@@ -32,7 +32,7 @@ from bemt.base.tables import number_of
 from bemt.data.readers import head_text, number
 from bemt.data.readers._large import NumberTable
 from bemt.data.readers.headings import heading
-from bemt.data.readers.recording import Builder, Told, slip
+from bemt.data.readers.recording import Builder, Remark, slip
 from bemt.data.readers.samples import MISREAD, MOST_RPM_PER_V, against_load, spikes
 from bemt.data.readers.split import SplitTable
 from bemt.physics.dataset import Dataset
@@ -173,7 +173,7 @@ def _speeds(build: Builder) -> None:
         note = "rpm: the file names neither its sensor nor the number of poles set in the stand's software"
         build.warnings.append(note)
     if agree:
-        build.warnings.append(Told(text))
+        build.warnings.append(Remark(text))
     elif both.size >= 3:
         near = round(ratio) if ratio > 1 else 1
         whole = near > 1 and abs(ratio / near - 1) < 0.05
@@ -214,7 +214,7 @@ def _power(build: Builder) -> None:
             text = f"mechanical_power_W is {ratio:.4g} times torque x {name}{slip(ratio)}"
             build.warnings.append(text + "; nothing was converted")
     if same:
-        build.warnings.append(Told(f"mechanical_power_W is torque times {' and '.join(same)}"))
+        build.warnings.append(Remark(f"mechanical_power_W is torque times {' and '.join(same)}"))
     if volt is not None and ampere is not None and electric is not None:
         ratio = _times(electric, volt * ampere)
         if ratio is not None and abs(ratio - 1.0) > 0.1:

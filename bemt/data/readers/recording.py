@@ -59,7 +59,7 @@ SLIP = 0.02
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(,\d{3})+(\.\d*)?")
 
 
-class Told(str):
+class Remark(str):
     """A note on what was found or done, with nothing to do about it."""
 
     __slots__ = ()
@@ -90,9 +90,9 @@ class Builder:
     def __post_init__(self) -> None:
         self.warnings.extend(self.table.warnings)
         if self.decimal == ".,":
-            self.warnings.append(Told("commas between thousands left out"))
+            self.warnings.append(Remark("commas between thousands left out"))
         if self.decimal == ",":
-            self.warnings.append(Told("decimal commas read as decimal points"))
+            self.warnings.append(Remark("decimal commas read as decimal points"))
         if self.table.cut is not None:
             self.flag([self.table.cut], "line cut off at the end of the file")
         self.flag(self.table.misfits, f"not {self.table.width} cells", "; no value of them is taken")
@@ -242,7 +242,7 @@ class Builder:
             name = self.free(f"{base}_s")
             self.channels[name], self.headings[name] = Channel(seconds, "s"), head.text
             self.clocks.append(name)
-            self.warnings.append(Told(f"column {label!r} is a clock: seconds since {column[0] or 'its first time'}"))
+            self.warnings.append(Remark(f"column {label!r} is a clock: seconds since {column[0] or 'its first time'}"))
             return name
         self.texts[self.free(base)] = tuple(column)
         if len(bad) < filled:
@@ -341,10 +341,10 @@ class Builder:
             self.fault("", f"no column of numbers ({columns})", "one column of numbers or more")
         self.check()
         if self.empty:
-            self.warnings.append(Told(f"no values in {number_of(len(self.empty), 'column')}: {some(self.empty, 8)}"))
+            self.warnings.append(Remark(f"no values in {number_of(len(self.empty), 'column')}: {some(self.empty, 8)}"))
         if self.words:
             note = f"text, kept as such, in {number_of(len(self.words), 'column')}: {some(self.words, 8)}"
-            self.warnings.append(Told(note))
+            self.warnings.append(Remark(note))
         if self.unitless:
             hint = "Name units in the headings or in a recording.toml" + _nearest(self.unitless, self.channels)
             self.warnings.append(f"no unit known, none assumed, for {some(self.unitless, 8)}. {hint}")

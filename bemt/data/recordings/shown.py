@@ -25,7 +25,7 @@ from bemt.base import tables
 from bemt.base.averaging import Mean
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK
 from bemt.data.readers.cfd_run import KIND as RUN
-from bemt.data.readers.recording import Told
+from bemt.data.readers.recording import Remark
 from bemt.data.recordings import cfd_run
 from bemt.data.recordings.cfd_setup import CfdRun
 from bemt.data.recordings.channels import named
@@ -209,7 +209,7 @@ class ImportedFile:
             lines.append(textwrap.fill(", ".join(plain), 110, initial_indent=lead, subsequent_indent="    "))
         lines += points_text(self.reduced) if self.reduced is not None else _curve(self.record) if curve else []
         step = self.step.partition("   (")[0]  # it stands under Next
-        lines += [f"  {'.' if isinstance(w, Told) else '!'} {w}" for w in self.warnings if not step or step not in w]
+        lines += [f"  {'.' if isinstance(w, Remark) else '!'} {w}" for w in self.warnings if not step or step not in w]
         lines += [text for text in told if text not in errors]
         return "\n".join(lines)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from bemt import __version__
 from bemt.base.tables import or_null, text_table
-from bemt.judge.compare.change_document import families, title_of
+from bemt.judge.compare.change_document import WORD, families, title_of
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import other_rotor
 from bemt.judge.diagnose.answer import bare
@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 SCHEMA = "bemt.diagnosis/1"
 
 _CHANNEL = {"thrust_N": "Thrust", "torque_Nm": "Torque", "rpm": "Speed of rotation"}
-_BY_POWER = {**_CHANNEL, "torque_Nm": "Electrical power"}
+_POWER = "electrical_power_W"
+_BY_POWER = {**_CHANNEL, "torque_Nm": WORD[_POWER].capitalize()}
 # Share of a parameter's range that its interval may take before nothing is said of it [1].
 _OPEN = 0.95
 _VARIABLE = {
@@ -363,9 +364,8 @@ def _ratios(d: Diagnosis) -> list[tuple[str, float]]:
     """Loads of the recording over those of the reference at equal speed, less 1; none where they were not compared."""
     if d.change is None:
         return []
-    said = {"electrical_power_W": "electrical power"}
-    ratios = ((said.get(c.channel, c.name), d.change.ratios[c.channel]) for c in d.change.loads_by_name.values())
-    return [(name, r.ratio - 1.0) for name, r in ratios]
+    of = d.change.loads_by_name.values()
+    return [(WORD[_POWER] if c.channel == _POWER else c.name, d.change.ratios[c.channel].ratio - 1.0) for c in of]
 
 
 def _from_reference(d: Diagnosis) -> str:

@@ -198,8 +198,7 @@ def _unused(imported: Dataset, rows: Dataset, case: Case) -> list[str]:
 
 def _points(imported: Dataset, rows: Dataset, path: str) -> Dataset:
     """Rows as they are: coefficients by their own names, measured channels as a recording names them."""
-    known = {*_POINT, *_LOADS} - ({"power_W"} - rows.values.keys())  # a wattmeter's is no load
-    values = {k: v for k, v in {**imported.values, **rows.values}.items() if k in known}
+    values = {k: v for k, v in rows.values.items() if k in {*_POINT, *_LOADS}}
     u = {k[2:]: v for k, v in imported.values.items() if k.startswith("u_")} | stated(rows)
     wet = {k: rows.values.get(k) for k in ("pressure_Pa", "temperature_K", "humidity")}
     if "density_kg_m3" not in values and all(v is not None and np.isfinite(v).all() for v in wet.values()):

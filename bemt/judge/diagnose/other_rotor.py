@@ -195,7 +195,8 @@ class Another:
         blade = np.where(free[:, None], np.nan_to_num(blade_tangents(problem)), 0.0)
         area = np.where(free, _AREA * problem.f0, 0.0)[:, None]
         # beside a reference: the solver is off for its rotor as it is for the case's, for another one as it may be
-        own = np.where(free[:, None], problem.tangents[:, problem.own], 0.0)[:, : 0 if free.all() else None]
+        shared = problem.own & (not free.all())
+        own = np.where(free[:, None], problem.tangents[:, shared], 0.0)
         other, make = np.arange(size.size), np.flatnonzero(np.abs(size) > 1.5 * _ROUNDED)
         families = ((np.concatenate([area, blade * LABELLED, own], axis=1), other),
                     (blade * (LABELLED[0], *AS_BUILT[1:]), make))  # fmt: skip

@@ -420,14 +420,15 @@ def _distances(plan: Problem, of: Sequence[effects.Effect | None], hyper: noise.
 
 
 def look(names: Sequence[str], record: Record) -> Suggestion | None:
-    """The quicker check by hand: that confirms the first explanation, or rules out the second."""
+    """The quicker check by hand: that confirms the first explanation, or rules out the second; seldom what all see."""
     aims = [(check, aim, name) for aim, name in zip(("confirm", "rule out"), names, strict=False)
             if (check := _check(name, record))]  # fmt: skip
     if not aims:
         return None
-    check, aim, name = min(aims, key=lambda one: effects.catalogue()[one[2]].check_minutes)
+    known = effects.catalogue()
+    check, aim, name = min(aims, key=lambda one: (known[one[2]].evident, known[one[2]].check_minutes))
     return Suggestion(f"to {aim} {title_of(name)}, {check}", (), (), 0.0, 0.0, "look", checks=name,
-                      minutes=effects.catalogue()[name].check_minutes)  # fmt: skip
+                      minutes=known[name].check_minutes)  # fmt: skip
 
 
 def correction(names: Sequence[str], settings: Mapping[str, Mapping[str, Any]], record: Record) -> Suggestion | None:
