@@ -315,7 +315,7 @@ _ALL: tuple[Cause, ...] = (
           off=("duct",), without=Change(ducted=False), variables=_FLOW),
     Cause("tip_gap", _world("leak", 1.0), ducted=True, plans=("gap",), off=("tip_gap",),
           without=Change(world={"leak": 0.0}), variables=("tip_gap",)),
-    Cause("lip_separation", _world("lip", 0.8), ducted=True, plans=tuple(p for p in DUCTED_PLANS if p != "gap"),
+    Cause("lip_separation", _world("lip", 0.5), ducted=True, plans=tuple(p for p in DUCTED_PLANS if p != "gap"),
           variables=(*_FLOW, *_SPEED)),
     Cause("ground_effect", _world("ground", 1.0), ducted=False, plans=("wall",), variables=("wall",)),
     Cause("recirculation", _recirculation, plans=("endurance",), variables=_CLOCK),

@@ -315,6 +315,7 @@ def _solve(
     if start is not None:
         gamma, induced = start.circulation.copy(), start.induced.copy()
         jet = np.where(np.isfinite(start.jet), start.jet, jet)
+    most_gamma = 1.5 * np.hypot(airspeed, omega * R)[:, None] * rotor.chord  # A lift coefficient of 3: none runs away
     change = np.full(rpm.shape, np.inf)
     step = np.full((rpm.size, 1), most if start is not None else min(0.7, most))
     eye = np.eye(n)[None]
@@ -342,7 +343,7 @@ def _solve(
         slope = 0.5 * rotor.chord * wt / np.maximum(w, 1e-6) * np.maximum(rise, 1.0 if most > 0.3 else -1.5)
         jacobian = eye + slope[:, :, None] * ma
         move = np.linalg.solve(jacobian, miss[:, :, None])[:, :, 0]
-        gamma = gamma + step * move
+        gamma = np.clip(gamma + step * move, -most_gamma, most_gamma)
         new = np.maximum(np.abs(gamma).max(axis=1), 1e-9)
         now = np.abs(miss).max(axis=1) / new
         step = np.where((now > change)[:, None], np.maximum(0.6 * step, 0.03), np.minimum(1.15 * step, most))
@@ -353,7 +354,8 @@ def _solve(
             if "lip" in extra:
                 mouth = np.maximum(np.sum((va + ua) * r * dr, axis=1) / np.sum(r * dr) - airspeed, 0.0)
                 lost = extra["lip"] / (1.0 + np.exp(-(mouth**2 / extra["lip_bears"] - 4.0) / 0.6))
-                left = left + 0.5 * (1.0 / (1.0 + lost * mouth**2 / np.maximum(left * head, 1e-9)) - left)
+                # At its onset the loss rises three times as fast as the head that drives it: slow, or it oscillates
+                left = left + 0.15 * (1.0 / (1.0 + lost * mouth**2 / np.maximum(left * head, 1e-9)) - left)
             jet = jet + 0.5 * (np.sqrt(np.maximum(airspeed**2 + left * head, 0.0)) - airspeed - jet)
         drift = np.abs(fresh - induced) / (omega * R)
         induced = np.maximum(induced + 0.7 * (fresh - induced), -0.4 * np.maximum(airspeed, 0.0))
