@@ -60,6 +60,16 @@ def test_a_duct_of_the_case_is_on_already(walls: object, answer: chain.Diagnosis
     assert ("duct" in knowledge.present(problem)) == (walls is not None)
 
 
+def test_a_duct_that_is_gone_is_a_cause_of_its_own() -> None:
+    """Anybody would see it at the stand; nobody sees it in a file."""
+    fan = case("ds30")
+    gone = recording(fan, points("static"), (effects.catalogue()["duct"](state="gone"),))
+    there = replace(from_series(recording(fan, points("static"), seed=3), fan), reference=True)
+    told = chain.diagnose([from_series(gone, fan), there], [fan])
+    assert "duct" in told.decision.effects
+    assert told.parameters["duct"]["state"].value == "gone"
+
+
 def test_the_nearest_signature_is_a_baseline_of_its_own(answer: chain.Diagnosis) -> None:
     assert form.nearest(answer.found) == "compressibility"
 

@@ -189,6 +189,8 @@ def _with_size(d: Diagnosis, name: str) -> str:
         return title_of(name)
     if cls.fault == "unit" and "unit" in found:
         return f"{cls.title} ({found['channel'].value}: {found['unit'].value})"
+    if "state" in found and found["state"].value != cls().state:  # type: ignore[attr-defined]
+        return f"{cls.title} ({found['state'].value})"
     sizes = [p for p in cls.parameters if p.off is not None and p.steps and p.name in found]
     value = found[sizes[0].name].value if len(sizes) == 1 else None
     if not isinstance(value, float) or (sizes[0].unit == "1" and not _is_share(sizes[0])):

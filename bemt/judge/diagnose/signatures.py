@@ -156,7 +156,7 @@ def candidates(
 
 def _candidate(problem: Problem, name: str, cls: type[Effect]) -> Candidate | None:
     present = next((e for e in problem.baseline if e.id == name), None)
-    given = cls().variants()
+    given = cls().settings(problem.parts[0].flow)
     columns: list[_Column] = []
     if given is not None:
         sizes = {p.name: p for p in cls.parameters if p.usual is not None}

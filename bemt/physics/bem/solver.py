@@ -7,11 +7,11 @@ kernel (:mod:`bemt.physics.bem.kernel`), in batch, and gives back a :class:`Solu
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -189,7 +189,7 @@ def prepare(
     if not any(e.id == "reynolds" for e in eff):
         polars = [(x, arrays.at_fixed_re(p)) for x, p in polars]
     for e in eff:
-        duct = _enclosed(duct, e.duct(rotor.R, duct is not None))
+        duct = e.duct(rotor.R, duct)
     if duct is not None:
         duct = replace(duct, area=rotor.annulus_area, span=rotor.R - rotor.Rhub)
     s = stations if stations is not None else rotor.blade.midpoints(n_stations, spacing="cosine")
@@ -244,15 +244,6 @@ def _blended(w: Array, tables: Array) -> Array:
     if w.shape[1] == 1:
         return np.repeat(tables, w.shape[0], axis=0)
     return np.tensordot(w, tables, axes=1)
-
-
-def _enclosed(duct: DuctFlow | None, numbers: Mapping[str, float] | None) -> DuctFlow | None:
-    """Duct with the numbers that an effect sets; an open rotor gets a duct of its own."""
-    if numbers is None:
-        return duct
-    from bemt.physics.bem.duct import DuctFlow
-
-    return replace(duct or DuctFlow(1.0), **dict[str, Any](numbers))
 
 
 def _numbers(bake: RotorBuild, duct: DuctFlow | None) -> Array:

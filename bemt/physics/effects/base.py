@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from bemt.physics.bem.duct import DuctFlow
     from geometry.airfoil import Airfoil
 
 Array = NDArray[np.float64]
@@ -488,22 +489,17 @@ class Effect:
     def momentum(self, bake: RotorBuild) -> None:
         """Set kernel numbers; does nothing by default."""
 
-    def duct(self, R: float, stated: bool) -> Mapping[str, float] | None:
-        """Numbers of :class:`bemt.physics.bem.duct.DuctFlow` that the effect sets to duct an open rotor; None: no duct.
+    def duct(self, R: float, duct: DuctFlow | None) -> DuctFlow | None:
+        """Duct around the rotor, None for none; that of the case by default.
 
         Parameters
         ----------
         R : float
             Tip radius [m].
-        stated : bool
-            Whether the case itself has a duct.
-
-        Returns
-        -------
-        mapping or None
-            Attributes by name, in their units.
+        duct : DuctFlow or None
+            What the case states.
         """
-        return None
+        return duct
 
     def flow(self, flow: Flow) -> None:
         """Change the conditions at the rotor; does nothing by default."""
@@ -554,6 +550,10 @@ class Effect:
         if not self.tried:
             return None
         return tuple(dict(zip(self.tried, values, strict=True)) for values in product(*self.tried.values()))
+
+    def settings(self, flow: Flow) -> tuple[dict[str, Any], ...] | None:
+        """Those that it tries at these points: `variants` by default."""
+        return self.variants()
 
     def odds(self) -> float:
         """Prior odds of this setting among those of `variants`, over those of the commonest; 1 by default. [1]"""

@@ -35,7 +35,11 @@ def choices(cls: type[Effect]) -> dict[str, list[Any]]:
     effect = cls()
     given, numbers = effect.variants() or (), {p.name for p in cls.parameters}
     return {
-        f.name: list(dict.fromkeys([getattr(effect, f.name), *(v[f.name] for v in given if f.name in v)]))
+        f.name: list(
+            dict.fromkeys(
+                [getattr(effect, f.name), *cls.words.get(f.name, ()), *(v[f.name] for v in given if f.name in v)]
+            )
+        )
         for f in dataclasses.fields(cls)  # type: ignore[arg-type]
         if f.name not in numbers
     }
