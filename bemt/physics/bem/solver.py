@@ -7,11 +7,11 @@ kernel (:mod:`bemt.physics.bem.kernel`), in batch, and gives back a :class:`Solu
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -188,8 +188,8 @@ def prepare(
     eff = standard() if effects is None else tuple(effects)
     if not any(e.id == "reynolds" for e in eff):
         polars = [(x, arrays.at_fixed_re(p)) for x, p in polars]
-    for e in eff:
-        duct = e.duct(rotor.R, duct)
+    for e in (e for e in eff if type(e).duct is not Effect.duct):
+        duct = _enclosed(duct, e.duct(rotor.R, duct is not None))
     if duct is not None:
         duct = replace(duct, area=rotor.annulus_area, span=rotor.R - rotor.Rhub)
     s = stations if stations is not None else rotor.blade.midpoints(n_stations, spacing="cosine")
@@ -244,6 +244,15 @@ def _blended(w: Array, tables: Array) -> Array:
     if w.shape[1] == 1:
         return np.repeat(tables, w.shape[0], axis=0)
     return np.tensordot(w, tables, axes=1)
+
+
+def _enclosed(duct: DuctFlow | None, numbers: Mapping[str, float] | None) -> DuctFlow | None:
+    """Duct with the numbers that an effect sets; an open rotor gets a duct of its own."""
+    if numbers is None:
+        return None
+    from bemt.physics.bem.duct import DuctFlow
+
+    return replace(duct or DuctFlow(1.0), **dict[str, Any](numbers))
 
 
 def _numbers(bake: RotorBuild, duct: DuctFlow | None) -> Array:

@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from bemt.physics.bem.duct import DuctFlow
     from geometry.airfoil import Airfoil
 
 Array = NDArray[np.float64]
@@ -489,17 +488,24 @@ class Effect:
     def momentum(self, bake: RotorBuild) -> None:
         """Set kernel numbers; does nothing by default."""
 
-    def duct(self, R: float, duct: DuctFlow | None) -> DuctFlow | None:
-        """Duct around the rotor, None for none; that of the case by default.
+    def duct(self, R: float, stated: bool) -> Mapping[str, float] | None:
+        """Numbers of :class:`bemt.physics.bem.duct.DuctFlow` that the effect sets, None for no duct.
+
+        Only effects with a duct of their own have this hook; the others leave that of the case.
 
         Parameters
         ----------
         R : float
             Tip radius [m].
-        duct : DuctFlow or None
-            What the case states.
+        stated : bool
+            Whether the case itself has a duct.
+
+        Returns
+        -------
+        mapping or None
+            Attributes by name, in their units.
         """
-        return duct
+        return None
 
     def flow(self, flow: Flow) -> None:
         """Change the conditions at the rotor; does nothing by default."""

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
 
 from bemt.physics.effects.base import Effect, Flow, Parameter
-
-if TYPE_CHECKING:
-    from bemt.physics.bem.duct import DuctFlow
 
 _RATIOS = (0.8, 0.85, 0.9, 0.95, 1.05, 1.1, 1.15, 1.2, 1.25, 1.3)
 
@@ -49,16 +47,14 @@ class DuctEffect(Effect):
     words = {"state": ("fitted", "gone")}
     on_by_default = False
 
-    def duct(self, R: float, duct: DuctFlow | None) -> DuctFlow | None:
-        """That of the case with another exit, or one of its own."""
-        from bemt.physics.bem.duct import DuctFlow
-
+    def duct(self, R: float, stated: bool) -> Mapping[str, float] | None:
+        """Exit area ratio of the duct, and what a case would state of it."""
         if self.state == "gone":
             return None
-        if duct is not None:
-            return replace(duct, wake_ratio=self.wake_ratio)
+        if stated:
+            return {"wake_ratio": self.wake_ratio}
         drag_area = self.outer_drag * math.pi * R**2
-        return DuctFlow(self.wake_ratio, lip_loss=self.lip_loss, drag_area=drag_area)
+        return {"wake_ratio": self.wake_ratio, "lip_loss": self.lip_loss, "drag_area": drag_area}
 
     def settings(self, flow: Flow) -> tuple[dict[str, Any], ...] | None:
         """Beside the duct of a case: another exit, or no duct at all."""
