@@ -24,7 +24,6 @@ from bemt.physics.effects.propeller import AnotherPropeller
 
 if TYPE_CHECKING:
     from bemt.judge.diagnose.answer import Diagnosis, Location
-    from bemt.judge.loss import Decision
     from bemt.physics.effects import Parameter
 
 SCHEMA = "bemt.diagnosis/1"
@@ -182,6 +181,14 @@ def _sized(p: Parameter, value: float, form: str = ".3g") -> str:
     return f"{value:{form}}" if p.unit in ("1", "") else f"{value:{form}} {p.unit}"
 
 
+def _title(d: Diagnosis, name: str) -> str:
+    """Title of an effect, and in which state it is, if that is not its usual one."""
+    cls, found = effects.catalogue().get(name), d.parameters.get(name, {}).get("state")
+    if cls is None or found is None or found.value == cls().state:  # type: ignore[attr-defined]
+        return title_of(name)
+    return f"{cls.title} ({found.value})"
+
+
 def _with_size(d: Diagnosis, name: str) -> str:
     """Title of a named effect and, where one number is its size, that number."""
     cls, found = effects.catalogue().get(name), d.parameters.get(name, {})
@@ -189,8 +196,8 @@ def _with_size(d: Diagnosis, name: str) -> str:
         return title_of(name)
     if cls.fault == "unit" and "unit" in found:
         return f"{cls.title} ({found['channel'].value}: {found['unit'].value})"
-    if "state" in found and found["state"].value != cls().state:  # type: ignore[attr-defined]
-        return f"{cls.title} ({found['state'].value})"
+    if (state := _title(d, name)) != cls.title:
+        return state
     sizes = [p for p in cls.parameters if p.off is not None and p.steps and p.name in found]
     value = found[sizes[0].name].value if len(sizes) == 1 else None
     if not isinstance(value, float) or (sizes[0].unit == "1" and not _is_share(sizes[0])):
@@ -261,7 +268,7 @@ def explanation(d: Diagnosis) -> list[str]:
             lines.append("Signature: " + "; ".join(signs) + ".")
     elif decision.verdict == "class":
         lead = "One of these" if len(decision.sets) < 2 else f"{decision.why[0].upper()}{decision.why[1:]}"
-        members = ", ".join(map(title_of, decision.effects))
+        members = ", ".join(_title(d, i) for i in decision.effects)
         lines.append(f"{lead} ({decision.probability:.2f}): {members}.")
     elif decision.verdict == "unknown":
         kernel = d.found.states[0].best_rival
@@ -320,20 +327,21 @@ def headline(d: Diagnosis) -> str:
         where = "" if said.verdict == "named" else " in the stand, not the air"
         return f"Cause found{where}: {' and '.join(_with_size(d, i) for i in said.effects)}{end}"
     if said.verdict == "class":
-        return f"{_of_class(said)}{end}"
+        return f"{_of_class(d)}{end}"
     what = _from_reference(d) or f"Recording and model differ ({off})"
     why = "and no effect in the library explains it"
     why = why if said.verdict == "unknown" else f"but these readings do not show why{_guess(d)}"
     return f"{what[0].upper()}{what[1:]}, {why}."
 
 
-def _of_class(said: Decision) -> str:
+def _of_class(d: Diagnosis) -> str:
     """What is said of a class."""
-    titles = [title_of(i) for i in said.effects]
+    said = d.said
+    titles = [_title(d, i) for i in said.effects]
     if said.beside:
         return f"Cause found: {titles[0]}. Possibly also: {' or '.join(titles[1:])}"
     if len(said.sets) > 1:
-        each = [" / ".join(map(title_of, s)) for s in said.sets]
+        each = [" / ".join(_title(d, i) for i in s) for s in said.sets]
         return f"Two causes: {' and '.join(f'one of ({w})' if ' / ' in w else w for w in each)}"
     if len(titles) > _A_GROUP:
         return f"{len(titles)} causes look alike in these readings: {families(said.effects)}"
