@@ -175,17 +175,21 @@ def hidden(
     return Hidden(causes, changes, world, stand, own_world, own_stand, stated, referenced, rng, more)
 
 
+class NoSolutionError(ValueError):
+    """The truth has no solution at most rows."""
+
+
 def make_item(
     bench: Bench, ids: tuple[str, ...], strengths: tuple[float, ...], seed: int, kind: str,
     known: Collection[str] = (), standard: Collection[str] = (),
 ) -> Item:  # fmt: skip
-    """Measure a truth with concealed causes."""
+    """Measure a truth with concealed causes; NoSolutionError where it has none at most rows."""
     h = hidden(bench, ids, strengths, seed, kind)
     causes, stand, rng = h.causes, h.stand, h.rng
     real, columns = bench.measure(h.world, stand, rng)
     good = np.isfinite(columns["thrust_N"]) & np.isfinite(columns["torque_Nm"])
     if np.mean(good) < 0.8:
-        raise ValueError(f"{bench.rig.name} {bench.plan} {ids}: the truth has no solution at most rows")
+        raise NoSolutionError(f"{bench.rig.name} {bench.plan} {ids}: the truth has no solution at most rows")
 
     air_known = "air_density" not in ids and (bench.plan == "two_air" or bool(rng.random() < 0.5))
     shown = _shown(bench, real, columns, stand, air_known, rng, h.stated)

@@ -25,7 +25,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, write_atomic
 from bemt.judge.proof import causes, real, rows, score
 from bemt.judge.proof.causes import CAUSES, LISTED, UNLISTED, extended
-from bemt.judge.proof.items import Bench, Item, make_item
+from bemt.judge.proof.items import Bench, Item, NoSolutionError, make_item
 from bemt.judge.proof.rows import Entry, Key, Miss, Proof, ScoreRow, ToldAnswer
 from bemt.judge.proof.stand import StandErrors, yardstick
 
@@ -147,7 +147,17 @@ def _measured(work: Sequence[tuple[Any, ...]], jobs: int) -> Iterator[list[Item]
 
 def _of_bench(work: tuple[Bench, list[Drawn], Collection[str], Collection[str]]) -> list[Item]:
     bench, drawn, known, standard = work
-    return [make_item(bench, d.ids, d.strengths, d.seed, d.kind, known, standard) for d in drawn]
+    return [_made(bench, d, known, standard) for d in drawn]
+
+
+def _made(bench: Bench, d: Drawn, known: Collection[str], standard: Collection[str], left: int = 5) -> Item:
+    """An item; a blade on which the truth has no solution is drawn anew, a few times."""
+    try:
+        return make_item(bench, d.ids, d.strengths, d.seed, d.kind, known, standard)
+    except NoSolutionError:
+        if not left:
+            raise
+        return _made(bench, replace(d, seed=d.seed + 1), known, standard, left - 1)
 
 
 def _pair(found: list[Bench], rng: np.random.Generator) -> tuple[Bench, tuple[str, ...]]:
