@@ -160,16 +160,25 @@ def _data_blocks(
 def _block(source: SourceText, lines: list[tuple[int, str]]) -> Dataset:
     head = lines[0][1]
     mark = ";" if ";" in head else "\t" if "\t" in head and "," not in head else ","
+    names = cells_of(head, mark)
+    if all(re.fullmatch(r"[-+.\deE]+", cell) for cell in names):
+        got = f"numbers ({', '.join(names[:4])})"
+        source.refuse(lines[0][0], got, "headings such as X [ m ]", "Is the head cut?")
+    columns = [_heading(cell) for cell in names]
+    return _surface(CFD_POST_CSV, source, lines, mark, columns, no_units(columns))
+
+
+def _surface(
+    form: str, source: SourceText, lines: list[tuple[int, str]], mark: str | None, columns: list[Column],
+    notes: list[str],
+) -> Dataset:  # fmt: skip
+    """Values at points, or a history, under a line of headings that each surface of a file may repeat."""
     rows = [ExportRow(line, cells_of(text, mark)) for line, text in lines]
-    columns = [_heading(cell) for cell in rows[0].cells]
-    if all(re.fullmatch(r"[-+.\deE]+", cell) for cell in rows[0].cells):
-        got = f"numbers ({', '.join(rows[0].cells[:4])})"
-        source.refuse(rows[0].line, got, "headings such as X [ m ]", "Is the head cut?")
     body = [row for row in rows[1:] if row.cells != rows[0].cells]
-    table = numeric_table(source, columns, body, commas=mark != ",")
-    notes = [f"headings repeated {len(rows) - 1 - len(body)} times"] if len(body) < len(rows) - 1 else []
+    again = len(rows) - 1 - len(body)
+    told = [f"headings repeated {number_of(again, 'time')}: several surfaces in one file"] if again else []
     build = history if columns[0].role == "time" else fields
-    return build(CFD_POST_CSV, source, columns, table, [*notes, *no_units(columns)])
+    return build(form, source, columns, numeric_table(source, columns, body, commas=mark != ","), [*told, *notes])
 
 
 # Fluent's ASCII export of a surface or zone: ``nodenumber, x-coordinate, ...``, comma or blanks between cells.
@@ -197,12 +206,7 @@ def read_fluent_ascii(path: str | os.PathLike[str]) -> Dataset:
     mark = next((m for m in (",", ";") if m in lines[0][1]), None)
     names = cells_of(lines[0][1], mark)
     columns = [Column(name or "unnamed", "", "value" if k else "index") for k, name in enumerate(names)]
-    rows = [ExportRow(k, cells_of(text, mark)) for k, text in lines[1:]]
-    body = [row for row in rows if row.cells != names]
-    table = numeric_table(source, columns, body, commas=mark != ",")
-    repeated = len(rows) - len(body)
-    notes = [f"header repeated {number_of(repeated, 'time')}: several surfaces in one file"] if repeated else []
-    return fields(FLUENT_ASCII, source, columns, table, [*notes, "no units stated (Fluent exports SI)"])
+    return _surface(FLUENT_ASCII, source, lines, mark, columns, ["no units stated (Fluent exports SI)"])
 
 
 # Design points of Ansys Workbench as CSV: one operating point a row.

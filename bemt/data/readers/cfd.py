@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,7 +21,7 @@ from bemt.base.averaging import Mean, keep_last, steady_average
 from bemt.base.errors import Fault
 from bemt.base.tables import number_of
 from bemt.data.readers import SourceText, head_text, number, unit_text
-from bemt.data.readers.samples import Channel, dataset
+from bemt.data.readers.samples import Channel, channels_of, dataset
 from bemt.physics.dataset import Dataset
 
 _NAN = re.compile(r"[+-]?(nan|n/a|-?1\.#(qnan|snan|ind|inf)\w*|inf(inity)?|null|\*+)(\(\w*\))?", re.IGNORECASE)
@@ -347,3 +347,13 @@ def fields(
     notes.append("values at points: no mean is taken, since points carry no areas")
     about = {**source.about, **(provenance or {}), "clock": "none"}
     return dataset(format, "cfd", channels, notes, about)
+
+
+def side_by_side(parts: Iterable[tuple[str, Dataset]]) -> tuple[dict[str, Channel], list[str]]:
+    """Channels of several tables of one file, each with the label of its table behind its name, and their notes."""
+    channels: dict[str, Channel] = {}
+    notes: list[str] = []
+    for label, record in parts:
+        channels |= {f"{name}({label})": channel for name, channel in channels_of(record).items()}
+        notes += [f"{label}: {text}" for text in record.notes]
+    return channels, notes

@@ -52,9 +52,10 @@ from bemt.data.readers.cfd import (
     history,
     numeric_table,
     si_unit,
+    side_by_side,
     unique,
 )
-from bemt.data.readers.samples import Channel, channels_of, dataset
+from bemt.data.readers.samples import Channel, dataset
 from bemt.physics.dataset import Dataset
 
 
@@ -301,35 +302,28 @@ def _record(
     source: SourceText, title: str, labels: list[str], zones: list[tuple[str, list[ExportRow]]], closed: bool
 ) -> Dataset:
     columns = [_column(label) for label in labels]
-    counts = columns[0].role in ("step", "time")
-    channels: dict[str, Channel] = {}
+    counts, keys = columns[0].role in ("step", "time"), unique([c.name for c in columns])
     notes: list[str] = [] if closed else ["the last list is not closed: the file may be cut"]
-    names = unique([zone for zone, _ in zones])
-    clocks: list[str] = []
-    for name, (_, data) in zip(names, zones, strict=True):
+    parts: dict[str, Dataset] = {}
+    for name, (_, data) in zip(unique([zone for zone, _ in zones]), zones, strict=True):
         if not data:
             notes.append(f"{name}: no points")
             continue
         table = numeric_table(source, columns, data)
-        record = history(FLUENT_XY, source, columns, table)
-        keys = unique([c.name for c in columns])
-        for k, (key, channel) in enumerate(zip(keys, channels_of(record).values(), strict=True)):
-            if counts:
-                channels[f"{key}({name})"] = channel
-                if k == 0:
-                    clocks.append(f"{key}({name})")
-            else:
-                channels[f"{key}({name})"] = Channel(table.values[:, k], columns[k].unit)
-        notes += [f"{name}: {text}" for text in (record.notes if counts else table.warnings)]
+        curve = {key: Channel(v, c.unit) for key, c, v in zip(keys, columns, table.values.T, strict=True)}
+        of_curve = dataset(FLUENT_XY, "cfd", curve, table.warnings)
+        parts[name] = history(FLUENT_XY, source, columns, table) if counts else of_curve
+    channels, more = side_by_side(parts.items())
+    notes += more
     if not channels:
         source.refuse("", "no points", "one pair of numbers or more")
-    if not counts:
-        notes.append("a curve over a position or frequency: no mean is taken")
     about = {**source.about, "title": title, "clock": "none"}
     if counts:
+        clocks = [f"{keys[0]}({name})" for name in parts]
         about |= {"clock": "time" if columns[0].role == "time" else "iteration", "clock_channels": "\t".join(clocks)}
-        if columns[0].role == "time" and len(clocks) == 1:
-            about["time_channel"] = clocks[0]
+        about |= {"time_channel": clocks[0]} if columns[0].role == "time" and len(clocks) == 1 else {}
+    else:
+        notes.append("a curve over a position or frequency: no mean is taken")
     return dataset(FLUENT_XY, "cfd", channels, notes, about)
 
 
