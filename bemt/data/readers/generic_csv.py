@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from bemt.data.readers import head_text, load_text, number
 from bemt.data.readers._large import NumberTable, large_table
 from bemt.data.readers._words import NEUTRAL, english
-from bemt.data.readers.headings import Heading, counts_electrical, heading, slug
+from bemt.data.readers.headings import USUAL, Heading, counts_electrical, heading, slug
 from bemt.data.readers.recording import Builder
 from bemt.data.readers.samples import Channel
 from bemt.data.readers.split import (
@@ -190,13 +190,6 @@ _ONLY = {  # channel: words that the heading of the only column in its unit may 
 }  # fmt: skip
 
 
-_SHORT = {
-    "thrust_N": ("T_N", "F_N", "force_N", "pull_N", "load_N", "load_cell_N", "loadcell_N"),
-    "torque_Nm": ("Q_Nm", "M_Nm"), "voltage_V": ("U_V",), "current_A": ("I_A",),
-}  # fmt: skip
-"""Names that recordings know for the quantity."""
-
-
 def only_ones(build: Builder) -> None:
     """A load that no column is headed for is that of the only column in its unit whose words leave it open."""
     for name, words in _ONLY.items():
@@ -205,7 +198,7 @@ def only_ones(build: Builder) -> None:
         ours = [
             k for k in same if set(english(build.headings[k])) - {unit.lower()} <= set(words.split()) | NEUTRAL | _MARKS
         ]
-        if name in same or not ours or any(k in build.channels for k in _SHORT.get(name, ())):
+        if name in same or not ours or any(USUAL.get(k) == name for k in build.channels):
             continue
         if len(same) == 1:
             label = build.rename(ours[0], name)
