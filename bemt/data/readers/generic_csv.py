@@ -66,9 +66,9 @@ def sniff(head: bytes | str) -> bool:
     lines = lines[start:]
     if len(lines) < 2:
         return False
-    if mark == " " and not all(_blank_numbers(t) for t in lines[1:20]):
-        return False
     split = [split_line(t, mark) for t in lines[:50]]
+    if mark == " " and any(len(c) < 2 or sum(number(x) is not None for x in c) < 0.8 * len(c) for c in split[1:20]):
+        return False
     split[0] = heading_cells(lines[0], mark, len(split[1]))
     width = len(split[0])
     if width < 2:
@@ -76,11 +76,6 @@ def sniff(head: bytes | str) -> bool:
     alike = sum(abs(len(cells) - width) <= 1 for cells in split[1:])
     numbers = sum(any(number(c) is not None or re.fullmatch(r"[+-]?\d+,\d+", c) for c in row) for row in split[1:])
     return min(alike, numbers) >= 0.5 * (len(split) - 1)
-
-
-def _blank_numbers(line: str) -> bool:
-    cells = line.split()
-    return len(cells) > 1 and sum(number(c) is not None for c in cells) >= 0.8 * len(cells)
 
 
 def read(path: str | os.PathLike[str]) -> Dataset:
@@ -145,7 +140,9 @@ def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
         own = build.headings[speeds[0]]
         build.warnings.append(f"{own!r} counts electrical revolutions: the speed of the rotor is that over pole pairs")
         build.asks.append("--pole-pairs PAIRS")
-    _several(build)
+    for name, kinds in setups(build.texts).items():
+        shown = ", ".join(kinds[:4]) + (", ..." if len(kinds) > 4 else "")
+        build.warnings.append(f"{len(kinds)} set-ups in one file, distinguished by {name!r}: {shown}")
     build.check_magnitudes()
     loads = {"thrust_N", "torque_Nm"} & build.channels.keys()
     if loads and (speeds or {"time_s", "pulse_width_s", "throttle"} & build.channels.keys()):
@@ -239,10 +236,3 @@ def setups(
         if SETUP.search(name.lower()) and 1 < len(kinds) <= max(2, len(cells) // 2):
             found[name] = kinds
     return found
-
-
-def _several(build: Builder) -> None:
-    """Say that a table holds several propellers or motors."""
-    for name, kinds in setups(build.texts).items():
-        shown = ", ".join(kinds[:4]) + (", ..." if len(kinds) > 4 else "")
-        build.warnings.append(f"{len(kinds)} set-ups in one file, distinguished by {name!r}: {shown}")

@@ -86,7 +86,10 @@ def read(path: str | os.PathLike[str]) -> Dataset:
     if said["mode"] == "continuous":
         build.flag_spikes("thrust_N", "torque_Nm", "current_A", "voltage_V")
     build.check_magnitudes()
-    _sign(build)
+    for name in ("thrust_N", "torque_Nm"):
+        v = build.at(name)
+        if v is not None and np.any(np.isfinite(v)) and -np.nanmin(v) > 2.0 * max(np.nanmax(v), 0.0):
+            build.warnings.append(f"{name} is mostly negative: another sign convention? The sign was not changed")
     return build.finish(said)
 
 
@@ -226,10 +229,3 @@ def _times(power: Array, product: Array, used: np.ndarray | bool = True) -> floa
     """Median of a power over the product of its factors in the rows that carry load; None: fewer than three."""
     good = (product > 0.05 * np.nanmax(np.append(product, 0.0))) & used
     return float(np.median(power[good] / product[good])) if np.count_nonzero(good) >= 3 else None
-
-
-def _sign(build: Builder) -> None:
-    for name in ("thrust_N", "torque_Nm"):
-        v = build.at(name)
-        if v is not None and np.any(np.isfinite(v)) and -np.nanmin(v) > 2.0 * max(np.nanmax(v), 0.0):
-            build.warnings.append(f"{name} is mostly negative: another sign convention? The sign was not changed")
