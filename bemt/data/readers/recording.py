@@ -24,12 +24,13 @@ from bemt.base.errors import Fault, refuse
 from bemt.base.tables import number_of
 from bemt.data.readers import load_text
 from bemt.data.readers._large import NumberTable
-from bemt.data.readers._words import english
+from bemt.data.readers._words import english, quantities
 from bemt.data.readers.headings import (
     CELLS,
     Heading,
     heading,
     in_usual_unit,
+    may_be_shaft_speed,
     meanings,
     slug,
     surely_shaft_speed,
@@ -345,7 +346,7 @@ class Builder:
             note = f"text, kept as such, in {number_of(len(self.words), 'column')}: {some(self.words, 8)}"
             self.warnings.append(Remark(note))
         if self.unitless:
-            hint = "Name units in the headings or in a recording.toml"
+            hint = "Name units in the headings or in a recording.toml" + _nearest(self.unitless, self.channels)
             self.warnings.append(f"no unit known, none assumed, for {some(self.unitless, 8)}. {hint}")
         said = {**self.table.source.about, "declared": self.declared, **(provenance or {})}
         asked = _asked(self.unitless, self.channels)
@@ -394,27 +395,59 @@ _MEANINGS = ("rpm", "thrust", "torque", "voltage", "current", "power", "time", "
 
 
 def _asked(headings: Sequence[str], channels: Iterable[str]) -> dict[str, str]:
-    """Options of ``bemt import``, by quantity, that state the unit of headings whose words are nearly one quantity.
+    """Options of ``bemt import``, by quantity, that state the unit of headings whose words are one quantity."""
+    out: dict[str, str] = {}
+    names = [label[1:].rsplit("'", 1)[0].split("' (")[0] for label in headings]
+    channels = {*channels} - {slug(name) for name in names}
+    for name in names:
+        found = set(meanings(name))
+        found -= {"pulse_width"} if "throttle" in found else set()
+        quantity = found.pop() if len(found) == 1 else ""
+        if quantity and not any(k == quantity or k.startswith(f"{quantity}_") for k in channels):
+            out.setdefault(quantity, f"--unit {shlex.quote(name)}=UNIT")
+    return out
+
+
+def _nearest(headings: Sequence[str], channels: Iterable[str] = ()) -> str:
+    r"""What headings without a unit may mean, and the line of a recording.toml that says so; empty: nothing is near.
 
     A bare ``speed`` is that of the shaft or of the air, whichever the file has not.
 
-    >>> _asked(["'Trust'", "'x'"], []), _asked(["'speed'"], ["airspeed_m_s"]), _asked(["'speed'"], [])
-    ({'thrust': '--column thrust=Trust --unit thrust=UNIT'}, {'rpm': '--unit speed=UNIT'}, {})
+    >>> _nearest(["'Trust'", "'x'"])  # doctest: +ELLIPSIS
+    '; nearest meaning: \'Trust\' thrust. The line: [columns] thrust = { column = "Trust", unit = "..." }, unit N, ...'
+    >>> _nearest(["'speed'"], ["airspeed_m_s"])  # doctest: +ELLIPSIS
+    '; nearest meaning: \'speed\' rpm. The line: [columns] rpm = { column = "speed", unit = "..." }, unit rpm, ...'
     """
-    out: dict[str, str] = {}
-    names = [label[1:].rsplit("'", 1)[0].split("' (")[0] for label in headings]
-    have = {*channels} - {slug(name) for name in names}
-    known = {q for q in _MEANINGS for k in have if k == q or k.startswith(f"{q}_")}
-    busy = {"rpm"} if any(re.search(r"(^|_)rpm|rad_s$", k) for k in have) else set()
-    busy |= {"airspeed"} if any(k == "J" or k.endswith("_m_s") for k in have) else set()
-    for name in names:
-        said, option = {*meanings(name)}, f"--unit {shlex.quote(name)}=UNIT"
-        said = said or ({"rpm"} if surely_shaft_speed(name) else set())
-        if not said:
-            said = {*difflib.get_close_matches(name.lower(), _MEANINGS, 1, 0.75)}
-            option = " ".join(f"--column {near}={shlex.quote(name)} --unit {near}=UNIT" for near in said)
-        said -= {"pulse_width"} if "throttle" in said else set()
-        open_ = said - known - (busy if len(said) > 1 else set())
-        if len(open_) == 1:
-            out.setdefault(open_.pop(), option)
-    return out
+    near: dict[str, list[str]] = {}
+    for label in headings:
+        name = label.split("'")[1] if "'" in label else label
+        word = re.split(r"[\s_(\[]", name.strip().lower())[0]
+        found = _speeds_meant(name, channels) if may_be_shaft_speed(name) else None
+        if found is None:
+            known = [q for q, _ in quantities(english(name)) if q in _MEANINGS]
+            found = known[:1] or difflib.get_close_matches(word, _MEANINGS, 1, 0.75)
+        if found:
+            near[name] = found
+    if not near:
+        return ""
+    name, meanings = next(iter(near.items()))
+    lines = [f'{m} = {{ column = "{name}", unit = "..." }}, unit {_UNITS_MEANT[m]}' for m in meanings]
+    told = ", ".join(f"{k!r} {' or '.join(v)}" for k, v in near.items())
+    return f"; nearest meaning: {told}. The line: [columns] {', or '.join(lines)}"
+
+
+_UNITS_MEANT = {
+    "rpm": "rpm, krpm, rev_s or rad_s", "thrust": "N, kgf, gf, lbf or ozf", "voltage": "V or mV",
+    "torque": "Nm, mNm, kgf_cm, gf_cm or lbf_in", "current": "A or mA", "power": "W or kW", "time": "s or ms",
+    "airspeed": "m_s, km_h, kt or mph", "throttle": "pct", "pressure": "Pa, hPa or mbar", "temperature": "C, K or F",
+    "density": "kg_m3", "humidity": "pct",
+}  # fmt: skip
+"""Units that a column of each meaning usually has; which, the file does not say."""
+
+
+def _speeds_meant(name: str, channels: Iterable[str]) -> list[str]:
+    """Speeds that a heading may mean, of those that the file has not yet."""
+    known = list(channels)
+    turning = any(re.search(r"(^|_)rpm|rad_s$", k) for k in known)
+    moving = any(k == "J" or k.endswith("_m_s") for k in known)
+    return [*([] if turning else ["rpm"]), *([] if moving or surely_shaft_speed(name) else ["airspeed"])]
