@@ -124,27 +124,35 @@ class Layout:
 _QUOTED = re.compile(r'"([^"]*)"')
 _REPORT = re.compile(r'\(\s*(?:"[^"]*"\s*)+\)')
 _MONITOR = re.compile(r'"[^"]*"(?:\s+"[^"]*")+')
-_UNIT = re.compile(r"(.+?)\s*\[\s*([^\[\]]+?)\s*\]")
-_STEPS = {"time step", "time-step", "iteration", "iterations"}
-_TIMES = {"flow time", "flow-time", "physical-time", "time"}
+_NAMED = {"[": r"(?P<name>.+?)\s*\[\s*(?P<unit>[^\[\]]+?)\s*\]",
+          "(": r"(?P<name>.*?)( Monitor(: [^()]*?)?)?( ?\((?P<unit>[^()]*)\))?"}  # fmt: skip
+"""Name and unit of a heading, by the brackets of its unit; STAR-CCM+ has what it is of after the name."""
+_ROLES = {
+    **dict.fromkeys(("time step", "time-step", "iteration", "iterations"), "step"),
+    **dict.fromkeys(("flow time", "flow-time", "physical time", "physical-time", "time", "cur_time"), "time"),
+    **dict.fromkeys(("time_iter", "outer_iter", "inner_iter", "physical_step", "pseudo_step"), "counter"),
+    "delta-time": "step_size", "time(min)": "wall", "time(sec)": "wall",
+}  # fmt: skip
 
 
-def column_of(name: str) -> Column:
-    """Make the column of a name in Fluent's words; times are in seconds.
+def column_of(text: str, brackets: str = "[") -> Column:
+    """Make the column of a heading in any program's words; times are in seconds, "" is for headings without a unit.
 
     >>> column_of("flow-time").name, column_of("Iteration").role, column_of("thrust(blade:1)").role
     ('time_s', 'step', 'value')
+    >>> column_of("Thrust 1 Monitor: Thrust (N)", "("), column_of("Time_Iter", "").role
+    (Column(name='Thrust 1', unit='N', role='value'), 'counter')
     """
-    stated = _UNIT.fullmatch(name.strip())
-    word = (stated[1] if stated else name).strip().lower()
-    if word in _STEPS:
-        return Column(name.strip(), "", "step")
-    if word in _TIMES and (stated is None or stated[2] == "s"):
-        return Column("time_s", "s", "time")
-    if word == "delta-time" and stated is None:
-        return Column("delta_time_s", "s", "step_size")
-    unit = (si_unit(stated[2]) or stated[2].strip()) if stated else ""
-    return Column(name.strip() or "unnamed", unit)
+    text = text.strip()
+    found = re.fullmatch(_NAMED[brackets], text) if brackets else None
+    name, unit = (found["name"], found["unit"] or "") if found else (text, "")
+    first, _, again = name.partition(": ")
+    role = _ROLES.get((first if again == first else name).lower(), "value")
+    if role in ("time", "step_size") and unit in ("", "s"):
+        return Column("time_s" if role == "time" else "delta_time_s", "s", role)
+    if role not in ("time", "step_size", "value"):
+        return Column(first, "", role)
+    return Column((name if brackets == "(" else text) or "unnamed", si_unit(unit) or unit)
 
 
 def _report(lines: list[str]) -> bool:
@@ -175,13 +183,10 @@ def _checked(columns: list[Column], table: ExportTable, notes: list[str]) -> tup
 
 # ---------------------------------------------------------------- STAR-CCM+, SU2, Flow360
 
-_HEADING = re.compile(r"(?P<name>.*?)(?P<monitor> Monitor(: (?P<what>[^()]*?))?)?( ?\((?P<unit>[^()]*)\))?")
-_CLOCK = re.compile(r"(Physical )?Time(: Physical Time)?( \(s\))?|Time Step(: Time Step)?|Iteration(: Iteration)?")
 _SU2 = re.compile(
     r'(VARIABLES\s*=\s*)?"\s*((Time|Outer|Inner)_Iter\s*"\s*,|Iteration\s*",(?=.*"\s*(C[DL]|Res_|rms\[)))',
     re.IGNORECASE,
 )
-_COUNTERS = ("Time_Iter", "Outer_Iter", "Inner_Iter", "Iteration", "physical_step", "pseudo_step")
 
 
 def _commas(line: str) -> tuple[str, ...]:
@@ -195,24 +200,15 @@ def _star_names(line: str) -> tuple[str, ...] | None:
     (('Iteration', 'Thrust 1 Monitor: Thrust (N)'), None)
     """
     own = line.startswith(("Physical Time: ", '"Physical Time: ')) or " Monitor" in line
-    return _commas(line) if own and any(_CLOCK.fullmatch(cell) for cell in _commas(line)) else None
+    return _commas(line) if own and any(_star(cell).role != "value" for cell in _commas(line)) else None
 
 
-def _star_column(name: str) -> Column:
-    if _CLOCK.fullmatch(name):
-        timed = "Time" in name and "Step" not in name
-        return Column("time_s", "s", "time") if timed else Column(name.split(":")[0], "", "step")
-    match = _HEADING.fullmatch(name)
-    unit = match["unit"] or "" if match else ""
-    return Column((match["name"] if match else name) or "unnamed", si_unit(unit) or unit)
+def _star(name: str) -> Column:
+    return column_of(name, "(")
 
 
-def _counted(name: str) -> Column:
-    """Column of SU2 or Flow360: a counter, simulated or wall time, or a coefficient."""
-    if name == "Cur_Time":
-        return Column("time_s", "s", "time")
-    wall = name.startswith("Time(")
-    return Column(name or "unnamed", "", "wall" if wall else "counter" if name in _COUNTERS else "value")
+def _plain(name: str) -> Column:
+    return column_of(name, "")
 
 
 def outermost(columns: list[Column], table: ExportTable, notes: list[str]) -> tuple[list[Column], ExportTable]:
@@ -341,19 +337,19 @@ READERS: tuple[Layout | Reader, ...] = (
         ("monitors state no units, reference values, sector or sign convention: check them",), within=3, told=_monitor,
     ),
     Layout(
-        "star_monitor", '"Iteration","Thrust 1 Monitor: Thrust (N)"', _star_names, _commas, _star_column,
+        "star_monitor", '"Iteration","Thrust 1 Monitor: Thrust (N)"', _star_names, _commas, _star,
         notes=("monitors state neither sector nor sign convention",), commas=False,
     ),
     Layout(
         "su2_history", '"Time_Iter","Inner_Iter","CD"',
-        lambda line: _commas(re.sub(r"^VARIABLES\s*=\s*", "", line)) if _SU2.match(line) else None, _commas, _counted,
+        lambda line: _commas(re.sub(r"^VARIABLES\s*=\s*", "", line)) if _SU2.match(line) else None, _commas, _plain,
         r"(TITLE|ZONE)\b", ("coefficients rest on reference values that the history does not state",), commas=False,
         finish=outermost, within=4,
     ),
     Layout(
         "flow360_forces", "physical_step, pseudo_step, CL, CD",
         lambda line: _commas(line) if _commas(line)[:2] == ("physical_step", "pseudo_step") else None, _commas,
-        _counted, notes=("coefficients rest on reference values that the file does not state",), commas=False,
+        _plain, notes=("coefficients rest on reference values that the file does not state",), commas=False,
         finish=outermost,
     ),
 )  # fmt: skip
