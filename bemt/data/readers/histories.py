@@ -66,11 +66,10 @@ class Layout:
     KIND: str
     example: str  # of a header, for messages
     header: Callable[[str], Sequence[str] | None]  # names on a line of headings; None on any other line
-    cells: Callable[[str], tuple[str, ...]]  # of a row
-    column: Callable[[str], Column]  # of a name
+    mark: str | None = None  # between the cells of a row; None: blanks, and a decimal comma is possible
+    brackets: str = "["  # of the unit in a heading; "": none has one
     skip: str = "(?!)"  # lines that are neither headings nor rows
     notes: tuple[str, ...] = ()
-    commas: bool = True  # whether a decimal comma is possible
     hint: str = "Is the header damaged?"  # where a row comes before the headings
     finish: Callable[[list[Column], ExportTable, list[str]], tuple[list[Column], ExportTable]] | None = None
     within: int = 1  # first lines that may be the header, for the sniffer
@@ -99,7 +98,7 @@ class Layout:
             elif not text or re.match(self.skip, text):
                 title = title or text.strip('"# ')
             elif names:
-                rows.append(ExportRow(line, self.cells(text)))
+                rows.append(ExportRow(line, cells_of(text, self.mark)))
             elif not early:
                 early = True
                 source.add(line, repr(text[:60]), f"a header such as {self.example}", self.hint)
@@ -109,8 +108,8 @@ class Layout:
             source.add("", f"a header ({', '.join(names)}) and no rows", "one row or more", "Did the run write a step?")
         if not rows:
             source.check()
-        columns = [self.column(name) for name in names]
-        table = numeric_table(source, columns, rows, self.commas)
+        columns = [column_of(name, self.brackets) for name in names]
+        table = numeric_table(source, columns, rows, commas=self.mark is None)
         source.check()
         again = f"header repeated in line {', '.join(map(str, repeated[:5]))}: the run was restarted"
         notes = [*([again] if repeated else []), *self.notes]
@@ -200,15 +199,7 @@ def _star_names(line: str) -> tuple[str, ...] | None:
     (('Iteration', 'Thrust 1 Monitor: Thrust (N)'), None)
     """
     own = line.startswith(("Physical Time: ", '"Physical Time: ')) or " Monitor" in line
-    return _commas(line) if own and any(_star(cell).role != "value" for cell in _commas(line)) else None
-
-
-def _star(name: str) -> Column:
-    return column_of(name, "(")
-
-
-def _plain(name: str) -> Column:
-    return column_of(name, "")
+    return _commas(line) if own and any(column_of(cell, "(").role != "value" for cell in _commas(line)) else None
 
 
 def outermost(columns: list[Column], table: ExportTable, notes: list[str]) -> tuple[list[Column], ExportTable]:
@@ -327,29 +318,27 @@ READERS: tuple[Layout | Reader, ...] = (
     Reader(FLUENT_XY, sniff_fluent_xy, read_fluent_xy),
     Layout(
         "fluent_report", '("Time Step" "thrust" "flow-time") in line 3',
-        lambda line: [name.strip() for name in _QUOTED.findall(line)] if _REPORT.fullmatch(line) else None,
-        lambda line: tuple(line.split()), column_of, '"',
+        lambda line: [name.strip() for name in _QUOTED.findall(line)] if _REPORT.fullmatch(line) else None, skip='"',
         hint="Line 3 of a report file lists all names; line 2 is abbreviated", finish=_checked, within=4, told=_report,
     ),
     Layout(
         "fluent_monitor", '"Flow Time" "cd"', lambda line: _QUOTED.findall(line) if _MONITOR.fullmatch(line) else None,
-        lambda line: tuple(line.split()), column_of, r'"[^"]*"$',
-        ("monitors state no units, reference values, sector or sign convention: check them",), within=3, told=_monitor,
+        skip=r'"[^"]*"$', within=3, told=_monitor,
+        notes=("monitors state no units, reference values, sector or sign convention: check them",),
     ),
     Layout(
-        "star_monitor", '"Iteration","Thrust 1 Monitor: Thrust (N)"', _star_names, _commas, _star,
-        notes=("monitors state neither sector nor sign convention",), commas=False,
+        "star_monitor", '"Iteration","Thrust 1 Monitor: Thrust (N)"', _star_names, ",", "(",
+        notes=("monitors state neither sector nor sign convention",),
     ),
     Layout(
         "su2_history", '"Time_Iter","Inner_Iter","CD"',
-        lambda line: _commas(re.sub(r"^VARIABLES\s*=\s*", "", line)) if _SU2.match(line) else None, _commas, _plain,
-        r"(TITLE|ZONE)\b", ("coefficients rest on reference values that the history does not state",), commas=False,
+        lambda line: _commas(re.sub(r"^VARIABLES\s*=\s*", "", line)) if _SU2.match(line) else None, ",", "",
+        r"(TITLE|ZONE)\b", ("coefficients rest on reference values that the history does not state",),
         finish=outermost, within=4,
     ),
     Layout(
         "flow360_forces", "physical_step, pseudo_step, CL, CD",
-        lambda line: _commas(line) if _commas(line)[:2] == ("physical_step", "pseudo_step") else None, _commas,
-        _plain, notes=("coefficients rest on reference values that the file does not state",), commas=False,
-        finish=outermost,
+        lambda line: _commas(line) if _commas(line)[:2] == ("physical_step", "pseudo_step") else None, ",", "",
+        notes=("coefficients rest on reference values that the file does not state",), finish=outermost,
     ),
 )  # fmt: skip
