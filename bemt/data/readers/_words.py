@@ -123,6 +123,7 @@ _HEADS: dict[str, tuple[str, set[str], set[str], set[str]]] = {
     **{f"acceleration {axis}": ("acceleration", {"acc", "acceleration"}, {axis}, {axis}) for axis in "xyz"},
     "vibration": ("acceleration", {"vibration"}, set(), set()),
 }  # fmt: skip
+DIMENSIONS = {name: dimension for name, (dimension, *_) in _HEADS.items()}
 
 
 def plain(text: str) -> str:

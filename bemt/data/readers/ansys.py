@@ -26,7 +26,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bemt.base.averaging import Mean
+from bemt.base.arrays import Array
 from bemt.base.tables import number_of
 from bemt.data.readers import Reader, SourceText, begins, load_text, number
 from bemt.data.readers.cfd import (
@@ -36,11 +36,11 @@ from bemt.data.readers.cfd import (
     fields,
     head_lines,
     history,
+    made_of,
     no_units,
     numeric_table,
     si_unit,
     slug,
-    unique,
 )
 from bemt.data.readers.headings import may_be_shaft_speed
 from bemt.data.readers.samples import Channel, channels_of, dataset
@@ -116,7 +116,7 @@ def read_cfd_post_csv(path: str | os.PathLike[str]) -> Dataset:
 
 def _expressions(source: SourceText, lines: list[tuple[int, str]]) -> Dataset:
     """Values of expressions, one a line."""
-    found: list[tuple[Column, float]] = []
+    columns, values = list[Column](), list[Array]()
     for line, text in lines[1:] if _VALUES.fullmatch(lines[0][1]) else lines:
         match = _EXPRESSION.fullmatch(text)
         value = number(match[2]) if match else None
@@ -124,13 +124,10 @@ def _expressions(source: SourceText, lines: list[tuple[int, str]]) -> Dataset:
             source.add(line, repr(text[:60]), "an expression, its value and unit, such as Thrust, 2.61 [N]")
         else:
             unit = si_unit(match[3]) or match[3].strip()
-            found.append((_heading(f"{match[1]} [{match[3]}]") if unit else Column(match[1]), value))
+            columns.append(_heading(f"{match[1]} [{match[3]}]") if unit else Column(match[1]))
+            values.append(np.array([value]))
     source.check()
-    columns = [column for column, _ in found]
-    channels = {
-        name: Channel(np.array([value]), column.unit, Mean(value, "one value of an expression"))
-        for name, (column, value) in zip(unique([c.name for c in columns]), found, strict=True)
-    }
+    channels = made_of(columns, values, "one value of an expression")
     return dataset(CFD_POST_CSV, "cfd", channels, no_units(columns), {**source.about, "clock": "none"})
 
 
@@ -274,12 +271,10 @@ def read_design_points(path: str | os.PathLike[str]) -> Dataset:
     heads = ((n, told.get(n) or _headed(n)) for n in names)
     columns = [Column(words, si_unit(own) or own) for n, (words, unit) in heads for own in (unit or units.get(n, ""),)]
     table = numeric_table(source, columns, rows, mark != ",")
-    keys = unique([c.name for c in columns])
-    channels = {key: Channel(v, c.unit) for key, c, v in zip(keys, columns, table.values.T, strict=True)}
     texts = {"name": tuple(labels)} if len(labels) == len(table.values) else {}
     about = {**source.about, "clock": "none"}
     notes = (*table.warnings, *no_units(columns))
-    return dataset(DESIGN_POINTS, "cfd", channels, notes, about, lines=table.lines, texts=texts)
+    return dataset(DESIGN_POINTS, "cfd", made_of(columns, table.values.T), notes, about, lines=table.lines, texts=texts)
 
 
 def _headed(name: str) -> tuple[str, str]:

@@ -159,6 +159,14 @@ def unique(names: Sequence[str]) -> list[str]:
     return out
 
 
+def made_of(columns: Sequence[Column], values: Iterable[Array], over: str = "") -> dict[str, Channel]:
+    """Channels of columns, each under a name of its own; the last value of each is its mean, of what `over` says."""
+    out: dict[str, Channel] = {}
+    for name, column, v in zip(unique([c.name for c in columns]), columns, values, strict=True):
+        out[name] = Channel(v, column.unit, Mean(float(v[-1]), over) if over else None)
+    return out
+
+
 def no_units(columns: Sequence[Column]) -> list[str]:
     """Note on columns without a unit, if any."""
     bare = [column.name for column in columns if not column.unit]
@@ -331,17 +339,17 @@ def fields(
 ) -> Dataset:  # fmt: skip
     """Make the record of values at points: no means, since points carry no area; equal repeated columns appear once."""
     notes = [*warnings, *table.warnings]
-    first: dict[str, Array] = {}
-    kept: list[tuple[Column, Array]] = []
+    first, arrays = dict[str, Array](), list[Array]()
+    kept: list[Column] = []
     for column, values in zip(columns, table.values.T, strict=True):
         twin = first.setdefault(column.name, values)
         if twin is not values and np.array_equal(twin, values, equal_nan=True):
             notes.append(f"column {column.name} is repeated with the same values: taken once")
         else:
-            kept.append((column, values))
-    names = unique([column.name for column, _ in kept])
-    channels = {n: Channel(values, column.unit) for n, (column, values) in zip(names, kept, strict=True)}
-    for name in names:
+            kept.append(column)
+            arrays.append(values)
+    channels = made_of(kept, arrays)
+    for name in channels:
         if "#" in name:
             notes.append(f"two columns are named {name.split('#')[0]} and differ: the later one is {name}")
     notes.append("values at points: no mean is taken, since points carry no areas")

@@ -50,12 +50,13 @@ from bemt.data.readers.cfd import (
     cells_of,
     head_lines,
     history,
+    made_of,
     numeric_table,
     si_unit,
     side_by_side,
     unique,
 )
-from bemt.data.readers.samples import Channel, dataset
+from bemt.data.readers.samples import dataset
 from bemt.physics.dataset import Dataset
 
 
@@ -289,7 +290,7 @@ def _record(
     source: SourceText, title: str, labels: list[str], zones: list[tuple[str, list[ExportRow]]], closed: bool
 ) -> Dataset:
     columns = [_column(label) for label in labels]
-    counts, keys = columns[0].role in ("step", "time"), unique([c.name for c in columns])
+    counts = columns[0].role in ("step", "time")
     notes: list[str] = [] if closed else ["the last list is not closed: the file may be cut"]
     parts: dict[str, Dataset] = {}
     for name, (_, data) in zip(unique([zone for zone, _ in zones]), zones, strict=True):
@@ -297,8 +298,7 @@ def _record(
             notes.append(f"{name}: no points")
             continue
         table = numeric_table(source, columns, data)
-        curve = {key: Channel(v, c.unit) for key, c, v in zip(keys, columns, table.values.T, strict=True)}
-        of_curve = dataset(FLUENT_XY, "cfd", curve, table.warnings)
+        of_curve = dataset(FLUENT_XY, "cfd", made_of(columns, table.values.T), table.warnings)
         parts[name] = history(FLUENT_XY, source, columns, table) if counts else of_curve
     channels, more = side_by_side(parts.items())
     notes += more
@@ -306,7 +306,7 @@ def _record(
         source.refuse("", "no points", "one pair of numbers or more")
     about = {**source.about, "title": title, "clock": "none"}
     if counts:
-        clocks = [f"{keys[0]}({name})" for name in parts]
+        clocks = [f"{columns[0].name}({name})" for name in parts]
         about |= {"clock": "time" if columns[0].role == "time" else "iteration", "clock_channels": "\t".join(clocks)}
         about |= {"time_channel": clocks[0]} if columns[0].role == "time" and len(clocks) == 1 else {}
     else:
