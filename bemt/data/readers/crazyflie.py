@@ -1,4 +1,4 @@
-"""Crazyflie: records of its bench, and flight logs, the binary files of its micro-SD card (``.usdlog``).
+"""Crazyflie: flight logs, the binary files of its micro-SD card (``.usdlog``); its bench is among the stands.
 
 Magic 0xBC, version, number of event types, their names and variables with a type letter, then records: id (u16), time
 (us; version 1: u32, version 2: u64), packed little-endian values; the last four bytes are a CRC32 of all
