@@ -57,6 +57,12 @@ class Average:
     per_revolution: tuple[float, ...] = ()  # Mean of each averaged revolution, in time order [unit of the values]
     problem: str = ""  # Why there is no mean, or what makes it doubtful; empty when nothing does
 
+    @property
+    def span(self) -> str:
+        """Revolutions that were averaged, with their times and rows, in words."""
+        rows = f"{self.start:.6g} to {self.end:.6g} s, {number_of(self.rows, 'row')}"
+        return f"last {number_of(self.revolutions, 'revolution')} ({rows})"
+
 
 def _mean(values: Array, weights: Array) -> float | None:
     """Weighted mean that neither overflows nor hides a NaN."""

@@ -90,31 +90,40 @@ FOREIGN = frozenset(w for w in _PLAIN if len(w) > 1 and re.search(r"[а-я\u3000
 _LONGEST = max(len(word.split()) for word in _PLAIN)
 
 NEUTRAL = {"mean", "measured", "corrected", "filtered", "net", "static", "of", "value", "actual", "raw", "reading"}
-_HEADS: dict[str, tuple[str, set[str], set[str]]] = {  # quantity: dimension, its own words, words that change nothing
-    "thrust": ("force", {"thrust"}, {"force", "propeller", "rotor", "motor", "output"}),
-    "torque": ("torque", {"torque"}, {"propeller", "rotor", "motor", "shaft", "reaction", "output"}),
-    "voltage": ("voltage", {"voltage", "v", "u"}, {"battery", "supply", "input", "bus", "dc", "esc"}),
+# quantity: dimension, its own words, words that change nothing, words of which one must be there
+_HEADS: dict[str, tuple[str, set[str], set[str], set[str]]] = {
+    "thrust": ("force", {"thrust"}, {"force", "propeller", "rotor", "motor", "output", "f", "fz", "t"}, set()),
+    "torque": ("torque", {"torque"}, {"propeller", "rotor", "motor", "shaft", "reaction", "output", "m", "mz", "q"},
+               set()),
+    "voltage": ("voltage", {"voltage", "v", "u"}, {"battery", "supply", "input", "bus", "dc", "esc"}, set()),
     "current": ("current", {"current"},
-                {"battery", "supply", "input", "bus", "dc", "esc", "draw", "total", "electrical"}),
-    "electrical power": ("power", {"power"}, {"electrical", "input", "battery", "supply", "esc", "dc", "total"}),
-    "mechanical power": ("power", {"power"}, {"mechanical", "shaft", "output", "propeller", "rotor"}),
-    "power": ("power", {"power"}, set()),
-    "time": ("time", {"time"}, {"elapsed", "test", "since", "start", "boot", "t"}),
+                {"battery", "supply", "input", "bus", "dc", "esc", "draw", "total", "electrical"}, set()),
+    "electrical power": ("power", {"power"}, {"electrical", "input", "battery", "supply", "esc", "dc", "total"},
+                         {"electrical", "input"}),
+    "mechanical power": ("power", {"power"}, {"mechanical", "shaft", "output", "propeller", "rotor"},
+                         {"mechanical", "shaft", "output"}),
+    "power": ("power", {"power"}, set(), set()),
+    "time": ("time", {"time", "timestamp"}, {"elapsed", "test", "since", "start", "boot", "t"}, set()),
     "throttle": ("fraction", {"throttle", "command", "setting", "duty", "pwm"},
-                 {"motor", "power", "cycle", "esc", "input", "position", "signal"}),
+                 {"motor", "power", "cycle", "esc", "input", "position", "signal"}, set()),
     "pulse width": ("time", {"pulse", "pwm", "esc", "signal", "throttle"},
-                    {"width", "servo", "input", "command", "motor"}),
+                    {"width", "servo", "input", "command", "motor"}, set()),
     "rpm": ("angular_speed", {"rotation", "rpm", "speed", "n"},
-            {"propeller", "rotor", "shaft", "tachometer", "tach", "hall", "rotational"}),
+            {"propeller", "rotor", "shaft", "tachometer", "tach", "hall", "rotational"}, set()),
+    "optical rpm": ("angular_speed", {"rotation", "speed"}, {"motor", "optical"}, {"optical"}),
+    "electrical rpm": ("angular_speed", {"rotation", "speed"}, {"motor", "electrical"}, {"electrical"}),
     "airspeed": ("speed", {"airspeed", "speed", "wind", "freestream", "v", "u", "v0", "u0", "va"},
-                 {"air", "flow", "free", "stream", "tunnel", "inflow", "flight", "true", "speed", "wind", "ambient"}),
-    "temperature": ("temperature", {"temperature"}, {"ambient", "air", "tunnel", "inlet"}),
-    "pressure": ("pressure", {"pressure"}, {"ambient", "air", "tunnel"}),
-    "density": ("density", {"density"}, {"ambient", "air"}),
-    "humidity": ("fraction", {"humidity"}, {"relative", "air", "ambient"}),
+                 {"air", "flow", "free", "stream", "tunnel", "inflow", "flight", "true", "speed", "wind", "ambient"},
+                 set()),
+    "temperature": ("temperature", {"temperature", "t"}, {"ambient", "air", "tunnel", "inlet"},
+                    {"temperature", "ambient"}),
+    "pressure": ("pressure", {"pressure", "p"}, {"ambient", "air", "tunnel"}, {"pressure", "ambient"}),
+    "density": ("density", {"density"}, {"ambient", "air"}, set()),
+    "humidity": ("fraction", {"humidity"}, {"relative", "air", "ambient"}, set()),
+    **{f"acceleration {axis}": ("acceleration", {"acc", "acceleration"}, {axis}, {axis}) for axis in "xyz"},
+    "vibration": ("acceleration", {"vibration"}, set(), set()),
 }  # fmt: skip
-_NEEDS = {"electrical power": {"electrical", "input"}, "mechanical power": {"mechanical", "shaft", "output"}}
-"""Words of which one must be there."""
+DIMENSIONS = {name: dimension for name, (dimension, *_) in _HEADS.items()}
 
 
 def plain(text: str) -> str:
@@ -155,7 +164,7 @@ def quantities(words: Iterable[str]) -> list[tuple[str, str]]:
     """
     said = set(words) - NEUTRAL
     out = []
-    for name, (dimension, heads, harmless) in _HEADS.items():
-        if said & heads and said <= heads | harmless and (name not in _NEEDS or said & _NEEDS[name]):
+    for name, (dimension, heads, harmless, needs) in _HEADS.items():
+        if said & heads and said <= heads | harmless and (not needs or said & needs):
             out.append((name, dimension))
     return out

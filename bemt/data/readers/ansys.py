@@ -26,7 +26,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bemt.base.averaging import Mean
+from bemt.base.arrays import Array
 from bemt.base.tables import number_of
 from bemt.data.readers import Reader, SourceText, begins, load_text, number
 from bemt.data.readers.cfd import (
@@ -36,11 +36,11 @@ from bemt.data.readers.cfd import (
     fields,
     head_lines,
     history,
+    made_of,
     no_units,
     numeric_table,
     si_unit,
     slug,
-    unique,
 )
 from bemt.data.readers.headings import may_be_shaft_speed
 from bemt.data.readers.samples import Channel, channels_of, dataset
@@ -116,7 +116,7 @@ def read_cfd_post_csv(path: str | os.PathLike[str]) -> Dataset:
 
 def _expressions(source: SourceText, lines: list[tuple[int, str]]) -> Dataset:
     """Values of expressions, one a line."""
-    found: list[tuple[Column, float]] = []
+    columns, values = list[Column](), list[Array]()
     for line, text in lines[1:] if _VALUES.fullmatch(lines[0][1]) else lines:
         match = _EXPRESSION.fullmatch(text)
         value = number(match[2]) if match else None
@@ -124,13 +124,10 @@ def _expressions(source: SourceText, lines: list[tuple[int, str]]) -> Dataset:
             source.add(line, repr(text[:60]), "an expression, its value and unit, such as Thrust, 2.61 [N]")
         else:
             unit = si_unit(match[3]) or match[3].strip()
-            found.append((_heading(f"{match[1]} [{match[3]}]") if unit else Column(match[1]), value))
+            columns.append(_heading(f"{match[1]} [{match[3]}]") if unit else Column(match[1]))
+            values.append(np.array([value]))
     source.check()
-    columns = [column for column, _ in found]
-    channels = {
-        name: Channel(np.array([value]), column.unit, Mean(value, "one value of an expression"))
-        for name, (column, value) in zip(unique([c.name for c in columns]), found, strict=True)
-    }
+    channels = made_of(columns, values, "one value of an expression")
     return dataset(CFD_POST_CSV, "cfd", channels, no_units(columns), {**source.about, "clock": "none"})
 
 
@@ -160,16 +157,25 @@ def _data_blocks(
 def _block(source: SourceText, lines: list[tuple[int, str]]) -> Dataset:
     head = lines[0][1]
     mark = ";" if ";" in head else "\t" if "\t" in head and "," not in head else ","
+    names = cells_of(head, mark)
+    if all(re.fullmatch(r"[-+.\deE]+", cell) for cell in names):
+        got = f"numbers ({', '.join(names[:4])})"
+        source.refuse(lines[0][0], got, "headings such as X [ m ]", "Is the head cut?")
+    columns = [_heading(cell) for cell in names]
+    return _surface(CFD_POST_CSV, source, lines, mark, columns, no_units(columns))
+
+
+def _surface(
+    form: str, source: SourceText, lines: list[tuple[int, str]], mark: str | None, columns: list[Column],
+    notes: list[str],
+) -> Dataset:  # fmt: skip
+    """Values at points, or a history, under a line of headings that each surface of a file may repeat."""
     rows = [ExportRow(line, cells_of(text, mark)) for line, text in lines]
-    columns = [_heading(cell) for cell in rows[0].cells]
-    if all(re.fullmatch(r"[-+.\deE]+", cell) for cell in rows[0].cells):
-        got = f"numbers ({', '.join(rows[0].cells[:4])})"
-        source.refuse(rows[0].line, got, "headings such as X [ m ]", "Is the head cut?")
     body = [row for row in rows[1:] if row.cells != rows[0].cells]
-    table = numeric_table(source, columns, body, commas=mark != ",")
-    notes = [f"headings repeated {len(rows) - 1 - len(body)} times"] if len(body) < len(rows) - 1 else []
+    again = len(rows) - 1 - len(body)
+    told = [f"headings repeated {number_of(again, 'time')}: several surfaces in one file"] if again else []
     build = history if columns[0].role == "time" else fields
-    return build(CFD_POST_CSV, source, columns, table, [*notes, *no_units(columns)])
+    return build(form, source, columns, numeric_table(source, columns, body, commas=mark != ","), [*told, *notes])
 
 
 # Fluent's ASCII export of a surface or zone: ``nodenumber, x-coordinate, ...``, comma or blanks between cells.
@@ -197,12 +203,7 @@ def read_fluent_ascii(path: str | os.PathLike[str]) -> Dataset:
     mark = next((m for m in (",", ";") if m in lines[0][1]), None)
     names = cells_of(lines[0][1], mark)
     columns = [Column(name or "unnamed", "", "value" if k else "index") for k, name in enumerate(names)]
-    rows = [ExportRow(k, cells_of(text, mark)) for k, text in lines[1:]]
-    body = [row for row in rows if row.cells != names]
-    table = numeric_table(source, columns, body, commas=mark != ",")
-    repeated = len(rows) - len(body)
-    notes = [f"header repeated {number_of(repeated, 'time')}: several surfaces in one file"] if repeated else []
-    return fields(FLUENT_ASCII, source, columns, table, [*notes, "no units stated (Fluent exports SI)"])
+    return _surface(FLUENT_ASCII, source, lines, mark, columns, ["no units stated (Fluent exports SI)"])
 
 
 # Design points of Ansys Workbench as CSV: one operating point a row.
@@ -270,12 +271,10 @@ def read_design_points(path: str | os.PathLike[str]) -> Dataset:
     heads = ((n, told.get(n) or _headed(n)) for n in names)
     columns = [Column(words, si_unit(own) or own) for n, (words, unit) in heads for own in (unit or units.get(n, ""),)]
     table = numeric_table(source, columns, rows, mark != ",")
-    keys = unique([c.name for c in columns])
-    channels = {key: Channel(v, c.unit) for key, c, v in zip(keys, columns, table.values.T, strict=True)}
     texts = {"name": tuple(labels)} if len(labels) == len(table.values) else {}
     about = {**source.about, "clock": "none"}
     notes = (*table.warnings, *no_units(columns))
-    return dataset(DESIGN_POINTS, "cfd", channels, notes, about, lines=table.lines, texts=texts)
+    return dataset(DESIGN_POINTS, "cfd", made_of(columns, table.values.T), notes, about, lines=table.lines, texts=texts)
 
 
 def _headed(name: str) -> tuple[str, str]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,7 +21,7 @@ from bemt.base.averaging import Mean, keep_last, steady_average
 from bemt.base.errors import Fault
 from bemt.base.tables import number_of
 from bemt.data.readers import SourceText, head_text, number, unit_text
-from bemt.data.readers.samples import Channel, dataset
+from bemt.data.readers.samples import Channel, channels_of, dataset
 from bemt.physics.dataset import Dataset
 
 _NAN = re.compile(r"[+-]?(nan|n/a|-?1\.#(qnan|snan|ind|inf)\w*|inf(inity)?|null|\*+)(\(\w*\))?", re.IGNORECASE)
@@ -156,6 +156,14 @@ def unique(names: Sequence[str]) -> list[str]:
         next_number[name] = k
         used.add(new)
         out.append(new)
+    return out
+
+
+def made_of(columns: Sequence[Column], values: Iterable[Array], over: str = "") -> dict[str, Channel]:
+    """Channels of columns, each under a name of its own; the last value of each is its mean, of what `over` says."""
+    out: dict[str, Channel] = {}
+    for name, column, v in zip(unique([c.name for c in columns]), columns, values, strict=True):
+        out[name] = Channel(v, column.unit, Mean(float(v[-1]), over) if over else None)
     return out
 
 
@@ -331,19 +339,29 @@ def fields(
 ) -> Dataset:  # fmt: skip
     """Make the record of values at points: no means, since points carry no area; equal repeated columns appear once."""
     notes = [*warnings, *table.warnings]
-    first: dict[str, Array] = {}
-    kept: list[tuple[Column, Array]] = []
+    first, arrays = dict[str, Array](), list[Array]()
+    kept: list[Column] = []
     for column, values in zip(columns, table.values.T, strict=True):
         twin = first.setdefault(column.name, values)
         if twin is not values and np.array_equal(twin, values, equal_nan=True):
             notes.append(f"column {column.name} is repeated with the same values: taken once")
         else:
-            kept.append((column, values))
-    names = unique([column.name for column, _ in kept])
-    channels = {n: Channel(values, column.unit) for n, (column, values) in zip(names, kept, strict=True)}
-    for name in names:
+            kept.append(column)
+            arrays.append(values)
+    channels = made_of(kept, arrays)
+    for name in channels:
         if "#" in name:
             notes.append(f"two columns are named {name.split('#')[0]} and differ: the later one is {name}")
     notes.append("values at points: no mean is taken, since points carry no areas")
     about = {**source.about, **(provenance or {}), "clock": "none"}
     return dataset(format, "cfd", channels, notes, about)
+
+
+def side_by_side(parts: Iterable[tuple[str, Dataset]]) -> tuple[dict[str, Channel], list[str]]:
+    """Channels of several tables of one file, each with the label of its table behind its name, and their notes."""
+    channels: dict[str, Channel] = {}
+    notes: list[str] = []
+    for label, record in parts:
+        channels |= {f"{name}({label})": channel for name, channel in channels_of(record).items()}
+        notes += [f"{label}: {text}" for text in record.notes]
+    return channels, notes

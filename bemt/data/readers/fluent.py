@@ -29,7 +29,7 @@ from bemt.base.averaging import Mean, keep_last
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of
 from bemt.data.readers import Reader, SourceText, load_text, number
-from bemt.data.readers.cfd import head_lines, si_unit, slug, unique
+from bemt.data.readers.cfd import Column, head_lines, made_of, si_unit, slug
 from bemt.data.readers.samples import Channel, dataset
 from bemt.physics.dataset import Dataset
 
@@ -176,15 +176,6 @@ def _off(line: int, what: str, whole: float, of: str, parts: Sequence[float]) ->
     return [f"line {line}: {what} is {whole:.6g}, its {of} add up to {sum(parts):.6g}"]
 
 
-def _channels(entries: Sequence[ForceEntry]) -> dict[str, Channel]:
-    """Make one channel of each number, its mean being the number."""
-    names = unique([f"{e.name}({e.zone})" for e in entries])
-    return {
-        name: Channel(np.array([e.value]), e.unit, Mean(e.value, "one value of a report"))
-        for name, e in zip(names, entries, strict=True)
-    }
-
-
 def read_fluent_forces(path: str | os.PathLike[str]) -> Dataset:
     """Read a force report."""
     source = load_text(path)
@@ -203,7 +194,9 @@ def read_fluent_forces(path: str | os.PathLike[str]) -> Dataset:
     notes.append("choose the zones that count: Net holds all that were selected in the report")
     titles = [text.strip() for text in source.lines if _TITLE.fullmatch(text.strip())]
     about = {**source.about, "tables": "; ".join(titles), "clock": "none"}
-    return dataset(FLUENT_FORCES, "cfd", _channels(entries), notes, about)
+    columns = [Column(f"{e.name}({e.zone})", e.unit) for e in entries]
+    channels = made_of(columns, (np.array([e.value]) for e in entries), "one value of a report")
+    return dataset(FLUENT_FORCES, "cfd", channels, notes, about)
 
 
 # Fluent transcripts (``*.trn``) and copied console text: residuals, flow time, computed reports, force reports.

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from bemt.data.readers import head_text, load_text, number
 from bemt.data.readers._large import NumberTable, large_table
 from bemt.data.readers._words import NEUTRAL, english
-from bemt.data.readers.headings import Heading, counts_electrical, heading, slug
+from bemt.data.readers.headings import USUAL, Heading, counts_electrical, heading, slug
 from bemt.data.readers.recording import Builder
 from bemt.data.readers.samples import Channel
 from bemt.data.readers.split import (
@@ -66,9 +66,9 @@ def sniff(head: bytes | str) -> bool:
     lines = lines[start:]
     if len(lines) < 2:
         return False
-    if mark == " " and not all(_blank_numbers(t) for t in lines[1:20]):
-        return False
     split = [split_line(t, mark) for t in lines[:50]]
+    if mark == " " and any(len(c) < 2 or sum(number(x) is not None for x in c) < 0.8 * len(c) for c in split[1:20]):
+        return False
     split[0] = heading_cells(lines[0], mark, len(split[1]))
     width = len(split[0])
     if width < 2:
@@ -76,11 +76,6 @@ def sniff(head: bytes | str) -> bool:
     alike = sum(abs(len(cells) - width) <= 1 for cells in split[1:])
     numbers = sum(any(number(c) is not None or re.fullmatch(r"[+-]?\d+,\d+", c) for c in row) for row in split[1:])
     return min(alike, numbers) >= 0.5 * (len(split) - 1)
-
-
-def _blank_numbers(line: str) -> bool:
-    cells = line.split()
-    return len(cells) > 1 and sum(number(c) is not None for c in cells) >= 0.8 * len(cells)
 
 
 def read(path: str | os.PathLike[str]) -> Dataset:
@@ -145,7 +140,9 @@ def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
         own = build.headings[speeds[0]]
         build.warnings.append(f"{own!r} counts electrical revolutions: the speed of the rotor is that over pole pairs")
         build.asks.append("--pole-pairs PAIRS")
-    _several(build)
+    for name, kinds in setups(build.texts).items():
+        shown = ", ".join(kinds[:4]) + (", ..." if len(kinds) > 4 else "")
+        build.warnings.append(f"{len(kinds)} set-ups in one file, distinguished by {name!r}: {shown}")
     build.check_magnitudes()
     loads = {"thrust_N", "torque_Nm"} & build.channels.keys()
     if loads and (speeds or {"time_s", "pulse_width_s", "throttle"} & build.channels.keys()):
@@ -190,13 +187,6 @@ _ONLY = {  # channel: words that the heading of the only column in its unit may 
 }  # fmt: skip
 
 
-_SHORT = {
-    "thrust_N": ("T_N", "F_N", "force_N", "pull_N", "load_N", "load_cell_N", "loadcell_N"),
-    "torque_Nm": ("Q_Nm", "M_Nm"), "voltage_V": ("U_V",), "current_A": ("I_A",),
-}  # fmt: skip
-"""Names that recordings know for the quantity."""
-
-
 def only_ones(build: Builder) -> None:
     """A load that no column is headed for is that of the only column in its unit whose words leave it open."""
     for name, words in _ONLY.items():
@@ -205,7 +195,7 @@ def only_ones(build: Builder) -> None:
         ours = [
             k for k in same if set(english(build.headings[k])) - {unit.lower()} <= set(words.split()) | NEUTRAL | _MARKS
         ]
-        if name in same or not ours or any(k in build.channels for k in _SHORT.get(name, ())):
+        if name in same or not ours or any(USUAL.get(k) == name for k in build.channels):
             continue
         if len(same) == 1:
             label = build.rename(ours[0], name)
@@ -246,10 +236,3 @@ def setups(
         if SETUP.search(name.lower()) and 1 < len(kinds) <= max(2, len(cells) // 2):
             found[name] = kinds
     return found
-
-
-def _several(build: Builder) -> None:
-    """Say that a table holds several propellers or motors."""
-    for name, kinds in setups(build.texts).items():
-        shown = ", ".join(kinds[:4]) + (", ..." if len(kinds) > 4 else "")
-        build.warnings.append(f"{len(kinds)} set-ups in one file, distinguished by {name!r}: {shown}")

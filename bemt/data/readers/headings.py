@@ -22,7 +22,6 @@ from bemt.data.readers.unit_text import (
     splits,
     unit_for,
     unit_of,
-    weight_of,
 )
 
 _RPM = units.UNITS["rpm"]
@@ -40,21 +39,6 @@ _ALONE = {  # a heading that is the name of a unit
     "volts": ("voltage", "V"), "volt": ("voltage", "V"), "amps": ("current", "A"), "amp": ("current", "A"),
     "amperes": ("current", "A"), "watts": ("P", "W"), "newtons": ("F", "N"),
     "grams": ("F", "gf"), "gramm": ("F", "gf"), "ounces": ("F", "ozf"),
-}  # fmt: skip
-_WORDS = {  # heading in lower case that `_words` has no quantity for, or leaves open -> name, dimension
-    "time": ("time", "time"), "airspeed": ("airspeed", "speed"), "throttle": ("throttle", "fraction"),
-    "esc signal": ("pulse_width", "time"), "esc": ("pulse_width", "time"), "pwm": ("pulse_width", "time"),
-    "motor optical speed": ("optical", "angular_speed"), "motor electrical speed": ("electrical", "angular_speed"),
-    "elapsed": ("time", "time"), "elapsed time": ("time", "time"), "time since start": ("time", "time"),
-    "timestamp": ("time", "time"), "air speed": ("airspeed", "speed"), "throttle input": ("throttle", "fraction"),
-    "pressure": ("pressure", "pressure"), "temperature": ("temperature", "temperature"),
-    "rotation speed": ("speed", "angular_speed"), "rotational speed": ("speed", "angular_speed"),
-    "motor speed": ("speed", "angular_speed"), "rotor speed": ("speed", "angular_speed"),
-    "propeller speed": ("speed", "angular_speed"), "force fz (thrust)": ("thrust", "force"),
-    "torque mz (torque)": ("torque", "torque"), "electrical speed": ("electrical", "angular_speed"),
-    "optical speed": ("optical", "angular_speed"), "vibration": ("vibration", "acceleration"),
-    "accx": ("acceleration_x", "acceleration"), "accy": ("acceleration_y", "acceleration"),
-    "accz": ("acceleration_z", "acceleration"),
 }  # fmt: skip
 USUAL: dict[str, str] = {
     "T_N": "thrust_N", "F_N": "thrust_N", "Q_Nm": "torque_Nm", "M_Nm": "torque_Nm", "U_V": "voltage_V",
@@ -80,11 +64,6 @@ _GOES: dict[str, tuple[str, ...]] = {  # what a suffix may be: T_A is rotor A's 
     "Q": ("torque",), "M": ("torque",), "P": ("power", "pressure", "length"), "I": ("current",), "U": ("voltage",),
     "V": ("voltage", "speed"), "n": ("angular_speed",), "D": ("length",), "R": ("length",), "r": ("length",),
 }  # fmt: skip
-_QUALIFIED = re.compile(
-    r"(?:(?:static|measured|mean|average|avg|propeller|prop|motor|rotor|output) )*(thrust|torque)"
-    r"(?: (?:force|static|mean|average|avg|measured))*|(?:f|t) (thrust)|(?:q|m) (torque)|(thrust) t|(torque) q"
-)
-"""Words that a thrust or a torque goes with and that make no other quantity of it."""
 _SEPARATORS = (r"\s+[-–—]\s+", r"\s*,\s*", r"\s+in\s+", r"\s*/\s*", r"\s+")
 _SHAFT_LETTERS = {"n", "ω"}
 _SHAFT_WORDS = set("speed omega rotation rotational rev revs revolution revolutions rps rpm krpm".split())
@@ -109,14 +88,8 @@ _TURNS = {
     "rotation", "rotational", "rev", "revs", "revolution", "revolutions", "shaft", "prop", "propeller", "rotor", "fan",
 }  # fmt: skip
 """Words with which a frequency counts revolutions; that of a motor may count electrical periods."""
-_AROUND = {
-    "ambient", "amb", "tamb", "pamb", "air", "room", "lab", "laboratory", "outside", "outdoor", "oat", "atmospheric",
-    "atmosphere", "atm", "baro", "barometer", "barometric", "environment", "environmental", "tunnel", "tair",
-    "umgebung", "umgebungstemperatur", "umgebungsdruck", "raumtemperatur", "ambiante", "ambiente",
-}  # fmt: skip
-"""Words that make a temperature, pressure, humidity or density that of the air around the rotor."""
 _ELECTRICAL = re.compile(r"(?=.*rpm).*[(\[]\s*(erpm|electrical)\s*[)\]]\s*", re.IGNORECASE)
-_SEA_LEVEL = "a pressure reduced to sea level: give that of the station (QFE)"
+_SEA_LEVEL = re.compile(r"\b(qnh|slp)\b")
 
 
 CELLS = re.compile(
@@ -204,9 +177,8 @@ def _tail(core: str) -> tuple[str, units.Unit | str] | None:
                 if separator in _SEPARATORS[:3]:
                     return name, f"{tail!r} is {unit}"
                 continue
-            word = _WORDS.get(name.lower().replace("_", " "))
             last = re.split(r"[\s_]+", name)[-1]
-            goes = _GOES.get(last if len(last) == 1 else last.lower(), (word[1],) if word else ())
+            goes = _GOES.get(last if len(last) == 1 else last.lower()) or [d for _, d in quantities(english(name))]
             loose = separator in _SEPARATORS[:3] and not goes
             letter = separator == _SEPARATORS[4] and tail in ("A", "C", "F", "in")
             if (unit.dimension in goes or loose) and not letter:
@@ -231,7 +203,8 @@ def meanings(text: str) -> list[str]:
     >>> meanings("Schub"), meanings("speed"), meanings("wibble")
     (['thrust'], ['rpm', 'airspeed'], [])
     """
-    found = [name for name, _ in quantities(english(re.split(r"[(\[]", text)[0]))]
+    known = quantities(english(re.split(r"[(\[]", text)[0]))
+    found = [name for name, dimension in known if dimension != "acceleration"]
     return ["power" if name == "mechanical power" else name.replace(" ", "_") for name in found]
 
 
@@ -325,15 +298,7 @@ def _as_stands_mean(text: str, base: str, stated: str) -> Heading | None:
         return Heading(text, "rpm", turns, told=f"{text!r} is read as revolutions per second")
     if stated in ("g/W", "G/W"):
         return replace(_heading(f"{base} (gf/W)"), text=text, told=f"{text!r} is read as gf/W")
-    if not (qualified := _QUALIFIED.fullmatch(plain(base))):
-        return None
-    name = next(word for word in qualified.groups() if word)
-    weight = weight_of(stated) if name == "torque" else ""
-    found = _heading(f"{name} ({weight or stated})")
-    told = (
-        f"{text!r} is read as {weight.replace(' ', ' times ')}: a weight, as stands mean it" if weight else found.told
-    )
-    return None if found.unit is None else replace(found, text=text, told=told)
+    return None
 
 
 @lru_cache(maxsize=4096)
@@ -378,26 +343,12 @@ def _by_words(text: str) -> Heading | None:
                 continue
             made, told = goes
             if dimension == "angular_speed":
-                if made.suffix == "rad_s":  # an angular speed is the reduction's to convert
+                if made.suffix == "rad_s" and name == "rpm":  # an angular speed is the reduction's to convert
                     turns = units.Unit("", "angular_speed", 1.0 / units.RPM)
                     return Heading(text, "rpm", turns) if words == ["rotation", "speed"] else None
-                return Heading(text, "rpm", _in_rpm(made))
+                return Heading(text, slug(name), _in_rpm(made))
             return Heading(text, _channel(slug(name), made), made, told=f"{text!r} is read as {told}" if told else "")
     return None
-
-
-def _of_the_air(base: str, unit: units.Unit) -> str:
-    """Quantity of the air around the rotor that a heading names; "qnh" for a pressure that is no local one; "" none."""
-    words = set(re.findall(r"[^\W\d_]+", plain(base)))
-    if unit.dimension == "pressure" and words & {"qnh", "slp"}:
-        return "qnh"
-    if unit.dimension == "fraction" and (words & {"humidity", "rh", "luftfeuchte", "luftfeuchtigkeit", "humedad"}):
-        return "humidity"
-    if unit.dimension in ("temperature", "pressure") and (words & _AROUND or words in ({"t", "inf"}, {"p", "inf"})):
-        return unit.dimension
-    if unit.dimension == "density" and words & {"rho", "density", "luftdichte"}:
-        return "density"
-    return ""
 
 
 def _name_and_unit(text: str) -> tuple[str, units.Unit | None, str]:
@@ -459,21 +410,14 @@ def _heading(text: str) -> Heading:
     if _ELECTRICAL.fullmatch(text):
         return Heading(text, "electrical_rpm", _RPM)
     base, unit, doubt = _name_and_unit(text)
-    word = _WORDS.get(base.lower().replace("_", " "))
-    if word and word[1] == "acceleration" and doubt.startswith("'g'"):
-        unit = units.Unit("m_s2", "acceleration", units.G0)
+    if unit is not None and unit.dimension == "pressure" and _SEA_LEVEL.search(plain(base)):
+        unit, doubt = None, "a pressure reduced to sea level: give that of the station (QFE)"
     if unit is None:
         return Heading(text, slug(text) or "column", None, doubt)
-    if around := _of_the_air(base, unit):
-        if around == "qnh":
-            return Heading(text, slug(text), None, _SEA_LEVEL)
-        base, word = around, None
     if unit.offset and base.startswith("u_"):  # an uncertainty in Celsius is one in kelvin
         unit = units.Unit(unit.suffix, unit.dimension, unit.factor)
-    if word and word[1] == unit.dimension:
-        base, unit = word[0], _in_rpm(unit)
     if unit.dimension == "angular_speed" and unit.suffix in ("rpm", ""):
-        flat = _small(r"^[A-Z][a-z]{2,}$", re.sub(r"^(speed|n)$|_?rpm_?", "", slug(base), flags=re.IGNORECASE))
+        flat = _small(r"^[A-Z][a-z]{2,}$", re.sub(r"^((motor_)?speed|n)$|_?rpm_?", "", slug(base), flags=re.IGNORECASE))
         flat = "electrical" if flat.lower() == "e" else flat
         return Heading(text, f"{flat}_rpm" if flat else "rpm", unit)
     return Heading(text, _channel(slug(_small(r"\b[A-Z][a-z]{2,}", base)), unit), unit)

@@ -50,11 +50,13 @@ from bemt.data.readers.cfd import (
     cells_of,
     head_lines,
     history,
+    made_of,
     numeric_table,
     si_unit,
+    side_by_side,
     unique,
 )
-from bemt.data.readers.samples import Channel, channels_of, dataset
+from bemt.data.readers.samples import dataset
 from bemt.physics.dataset import Dataset
 
 
@@ -65,11 +67,10 @@ class Layout:
     KIND: str
     example: str  # of a header, for messages
     header: Callable[[str], Sequence[str] | None]  # names on a line of headings; None on any other line
-    cells: Callable[[str], tuple[str, ...]]  # of a row
-    column: Callable[[str], Column]  # of a name
+    mark: str | None = None  # between the cells of a row; None: blanks, and a decimal comma is possible
+    brackets: str = "["  # of the unit in a heading; "": none has one
     skip: str = "(?!)"  # lines that are neither headings nor rows
     notes: tuple[str, ...] = ()
-    commas: bool = True  # whether a decimal comma is possible
     hint: str = "Is the header damaged?"  # where a row comes before the headings
     finish: Callable[[list[Column], ExportTable, list[str]], tuple[list[Column], ExportTable]] | None = None
     within: int = 1  # first lines that may be the header, for the sniffer
@@ -98,7 +99,7 @@ class Layout:
             elif not text or re.match(self.skip, text):
                 title = title or text.strip('"# ')
             elif names:
-                rows.append(ExportRow(line, self.cells(text)))
+                rows.append(ExportRow(line, cells_of(text, self.mark)))
             elif not early:
                 early = True
                 source.add(line, repr(text[:60]), f"a header such as {self.example}", self.hint)
@@ -108,8 +109,8 @@ class Layout:
             source.add("", f"a header ({', '.join(names)}) and no rows", "one row or more", "Did the run write a step?")
         if not rows:
             source.check()
-        columns = [self.column(name) for name in names]
-        table = numeric_table(source, columns, rows, self.commas)
+        columns = [column_of(name, self.brackets) for name in names]
+        table = numeric_table(source, columns, rows, commas=self.mark is None)
         source.check()
         again = f"header repeated in line {', '.join(map(str, repeated[:5]))}: the run was restarted"
         notes = [*([again] if repeated else []), *self.notes]
@@ -123,27 +124,35 @@ class Layout:
 _QUOTED = re.compile(r'"([^"]*)"')
 _REPORT = re.compile(r'\(\s*(?:"[^"]*"\s*)+\)')
 _MONITOR = re.compile(r'"[^"]*"(?:\s+"[^"]*")+')
-_UNIT = re.compile(r"(.+?)\s*\[\s*([^\[\]]+?)\s*\]")
-_STEPS = {"time step", "time-step", "iteration", "iterations"}
-_TIMES = {"flow time", "flow-time", "physical-time", "time"}
+_NAMED = {"[": r"(?P<name>.+?)\s*\[\s*(?P<unit>[^\[\]]+?)\s*\]",
+          "(": r"(?P<name>.*?)( Monitor(: [^()]*?)?)?( ?\((?P<unit>[^()]*)\))?"}  # fmt: skip
+"""Name and unit of a heading, by the brackets of its unit; STAR-CCM+ has what it is of after the name."""
+_ROLES = {
+    **dict.fromkeys(("time step", "time-step", "iteration", "iterations"), "step"),
+    **dict.fromkeys(("flow time", "flow-time", "physical time", "physical-time", "time", "cur_time"), "time"),
+    **dict.fromkeys(("time_iter", "outer_iter", "inner_iter", "physical_step", "pseudo_step"), "counter"),
+    "delta-time": "step_size", "time(min)": "wall", "time(sec)": "wall",
+}  # fmt: skip
 
 
-def column_of(name: str) -> Column:
-    """Make the column of a name in Fluent's words; times are in seconds.
+def column_of(text: str, brackets: str = "[") -> Column:
+    """Make the column of a heading in any program's words; times are in seconds, "" is for headings without a unit.
 
     >>> column_of("flow-time").name, column_of("Iteration").role, column_of("thrust(blade:1)").role
     ('time_s', 'step', 'value')
+    >>> column_of("Thrust 1 Monitor: Thrust (N)", "("), column_of("Time_Iter", "").role
+    (Column(name='Thrust 1', unit='N', role='value'), 'counter')
     """
-    stated = _UNIT.fullmatch(name.strip())
-    word = (stated[1] if stated else name).strip().lower()
-    if word in _STEPS:
-        return Column(name.strip(), "", "step")
-    if word in _TIMES and (stated is None or stated[2] == "s"):
-        return Column("time_s", "s", "time")
-    if word == "delta-time" and stated is None:
-        return Column("delta_time_s", "s", "step_size")
-    unit = (si_unit(stated[2]) or stated[2].strip()) if stated else ""
-    return Column(name.strip() or "unnamed", unit)
+    text = text.strip()
+    found = re.fullmatch(_NAMED[brackets], text) if brackets else None
+    name, unit = (found["name"], found["unit"] or "") if found else (text, "")
+    first, _, again = name.partition(": ")
+    role = _ROLES.get((first if again == first else name).lower(), "value")
+    if role in ("time", "step_size") and unit in ("", "s"):
+        return Column("time_s" if role == "time" else "delta_time_s", "s", role)
+    if role not in ("time", "step_size", "value"):
+        return Column(first, "", role)
+    return Column((name if brackets == "(" else text) or "unnamed", si_unit(unit) or unit)
 
 
 def _report(lines: list[str]) -> bool:
@@ -174,13 +183,10 @@ def _checked(columns: list[Column], table: ExportTable, notes: list[str]) -> tup
 
 # ---------------------------------------------------------------- STAR-CCM+, SU2, Flow360
 
-_HEADING = re.compile(r"(?P<name>.*?)(?P<monitor> Monitor(: (?P<what>[^()]*?))?)?( ?\((?P<unit>[^()]*)\))?")
-_CLOCK = re.compile(r"(Physical )?Time(: Physical Time)?( \(s\))?|Time Step(: Time Step)?|Iteration(: Iteration)?")
 _SU2 = re.compile(
     r'(VARIABLES\s*=\s*)?"\s*((Time|Outer|Inner)_Iter\s*"\s*,|Iteration\s*",(?=.*"\s*(C[DL]|Res_|rms\[)))',
     re.IGNORECASE,
 )
-_COUNTERS = ("Time_Iter", "Outer_Iter", "Inner_Iter", "Iteration", "physical_step", "pseudo_step")
 
 
 def _commas(line: str) -> tuple[str, ...]:
@@ -194,24 +200,7 @@ def _star_names(line: str) -> tuple[str, ...] | None:
     (('Iteration', 'Thrust 1 Monitor: Thrust (N)'), None)
     """
     own = line.startswith(("Physical Time: ", '"Physical Time: ')) or " Monitor" in line
-    return _commas(line) if own and any(_CLOCK.fullmatch(cell) for cell in _commas(line)) else None
-
-
-def _star_column(name: str) -> Column:
-    if _CLOCK.fullmatch(name):
-        timed = "Time" in name and "Step" not in name
-        return Column("time_s", "s", "time") if timed else Column(name.split(":")[0], "", "step")
-    match = _HEADING.fullmatch(name)
-    unit = match["unit"] or "" if match else ""
-    return Column((match["name"] if match else name) or "unnamed", si_unit(unit) or unit)
-
-
-def _counted(name: str) -> Column:
-    """Column of SU2 or Flow360: a counter, simulated or wall time, or a coefficient."""
-    if name == "Cur_Time":
-        return Column("time_s", "s", "time")
-    wall = name.startswith("Time(")
-    return Column(name or "unnamed", "", "wall" if wall else "counter" if name in _COUNTERS else "value")
+    return _commas(line) if own and any(column_of(cell, "(").role != "value" for cell in _commas(line)) else None
 
 
 def outermost(columns: list[Column], table: ExportTable, notes: list[str]) -> tuple[list[Column], ExportTable]:
@@ -302,34 +291,26 @@ def _record(
 ) -> Dataset:
     columns = [_column(label) for label in labels]
     counts = columns[0].role in ("step", "time")
-    channels: dict[str, Channel] = {}
     notes: list[str] = [] if closed else ["the last list is not closed: the file may be cut"]
-    names = unique([zone for zone, _ in zones])
-    clocks: list[str] = []
-    for name, (_, data) in zip(names, zones, strict=True):
+    parts: dict[str, Dataset] = {}
+    for name, (_, data) in zip(unique([zone for zone, _ in zones]), zones, strict=True):
         if not data:
             notes.append(f"{name}: no points")
             continue
         table = numeric_table(source, columns, data)
-        record = history(FLUENT_XY, source, columns, table)
-        keys = unique([c.name for c in columns])
-        for k, (key, channel) in enumerate(zip(keys, channels_of(record).values(), strict=True)):
-            if counts:
-                channels[f"{key}({name})"] = channel
-                if k == 0:
-                    clocks.append(f"{key}({name})")
-            else:
-                channels[f"{key}({name})"] = Channel(table.values[:, k], columns[k].unit)
-        notes += [f"{name}: {text}" for text in (record.notes if counts else table.warnings)]
+        of_curve = dataset(FLUENT_XY, "cfd", made_of(columns, table.values.T), table.warnings)
+        parts[name] = history(FLUENT_XY, source, columns, table) if counts else of_curve
+    channels, more = side_by_side(parts.items())
+    notes += more
     if not channels:
         source.refuse("", "no points", "one pair of numbers or more")
-    if not counts:
-        notes.append("a curve over a position or frequency: no mean is taken")
     about = {**source.about, "title": title, "clock": "none"}
     if counts:
+        clocks = [f"{columns[0].name}({name})" for name in parts]
         about |= {"clock": "time" if columns[0].role == "time" else "iteration", "clock_channels": "\t".join(clocks)}
-        if columns[0].role == "time" and len(clocks) == 1:
-            about["time_channel"] = clocks[0]
+        about |= {"time_channel": clocks[0]} if columns[0].role == "time" and len(clocks) == 1 else {}
+    else:
+        notes.append("a curve over a position or frequency: no mean is taken")
     return dataset(FLUENT_XY, "cfd", channels, notes, about)
 
 
@@ -337,29 +318,27 @@ READERS: tuple[Layout | Reader, ...] = (
     Reader(FLUENT_XY, sniff_fluent_xy, read_fluent_xy),
     Layout(
         "fluent_report", '("Time Step" "thrust" "flow-time") in line 3',
-        lambda line: [name.strip() for name in _QUOTED.findall(line)] if _REPORT.fullmatch(line) else None,
-        lambda line: tuple(line.split()), column_of, '"',
+        lambda line: [name.strip() for name in _QUOTED.findall(line)] if _REPORT.fullmatch(line) else None, skip='"',
         hint="Line 3 of a report file lists all names; line 2 is abbreviated", finish=_checked, within=4, told=_report,
     ),
     Layout(
         "fluent_monitor", '"Flow Time" "cd"', lambda line: _QUOTED.findall(line) if _MONITOR.fullmatch(line) else None,
-        lambda line: tuple(line.split()), column_of, r'"[^"]*"$',
-        ("monitors state no units, reference values, sector or sign convention: check them",), within=3, told=_monitor,
+        skip=r'"[^"]*"$', within=3, told=_monitor,
+        notes=("monitors state no units, reference values, sector or sign convention: check them",),
     ),
     Layout(
-        "star_monitor", '"Iteration","Thrust 1 Monitor: Thrust (N)"', _star_names, _commas, _star_column,
-        notes=("monitors state neither sector nor sign convention",), commas=False,
+        "star_monitor", '"Iteration","Thrust 1 Monitor: Thrust (N)"', _star_names, ",", "(",
+        notes=("monitors state neither sector nor sign convention",),
     ),
     Layout(
         "su2_history", '"Time_Iter","Inner_Iter","CD"',
-        lambda line: _commas(re.sub(r"^VARIABLES\s*=\s*", "", line)) if _SU2.match(line) else None, _commas, _counted,
-        r"(TITLE|ZONE)\b", ("coefficients rest on reference values that the history does not state",), commas=False,
+        lambda line: _commas(re.sub(r"^VARIABLES\s*=\s*", "", line)) if _SU2.match(line) else None, ",", "",
+        r"(TITLE|ZONE)\b", ("coefficients rest on reference values that the history does not state",),
         finish=outermost, within=4,
     ),
     Layout(
         "flow360_forces", "physical_step, pseudo_step, CL, CD",
-        lambda line: _commas(line) if _commas(line)[:2] == ("physical_step", "pseudo_step") else None, _commas,
-        _counted, notes=("coefficients rest on reference values that the file does not state",), commas=False,
-        finish=outermost,
+        lambda line: _commas(line) if _commas(line)[:2] == ("physical_step", "pseudo_step") else None, ",", "",
+        notes=("coefficients rest on reference values that the file does not state",), finish=outermost,
     ),
 )  # fmt: skip

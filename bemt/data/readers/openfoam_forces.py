@@ -24,10 +24,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from bemt.base.arrays import Array
 from bemt.base.averaging import Mean
 from bemt.base.tables import number_of
 from bemt.data.readers import SourceText, load_text
-from bemt.data.readers.cfd import Column, ExportRow, ExportTable, head_lines, history, numeric_table
+from bemt.data.readers.cfd import Column, ExportRow, ExportTable, head_lines, history, numeric_table, side_by_side
 from bemt.data.readers.samples import Channel, dataset
 from bemt.physics.dataset import Dataset
 
@@ -42,8 +43,8 @@ _PROPELLER: dict[str, tuple[str, str, float]] = {
     "10*KQ": ("CQ", "-", 0.1), "eta0": ("eta", "-", 1.0),
 }  # fmt: skip
 """Columns of ``propellerInfo``: channel, unit, factor."""
-_PARTS = ("total", "pressure", "viscous", "porous", "internal")
-_DAMAGED = "damaged parentheses"
+_PART = re.compile(r"(?P<base>\w+)_(?P<part>\w+)_(?P<axis>[xyz])_(?P<unit>Nm?)")
+_EXPECTED = "a header such as # Time total_x total_y total_z"
 _VECTOR = re.compile(r"\(\s*((?:\w+_[xyz]\s*){3})\)")
 
 
@@ -67,6 +68,7 @@ class _Head:
     repeated: int = 0
     settings: dict[str, str] = field(default_factory=dict)
     probes: dict[str, str] = field(default_factory=dict)
+    vectors: bool = False  # at probes
 
     def take(self, line: int, text: str) -> None:
         """Read one of them."""
@@ -84,18 +86,23 @@ class _Head:
             self.title = text.strip("# \t")
 
 
-def _columns(header: str, title: str) -> tuple[list[Column], list[tuple[str, list[str]]]]:
-    """Columns of a header, and in the old layout its groups with their parts."""
-    time, nested = Column("Time", "", "time"), _NESTED.findall(header)
+def _columns(top: _Head) -> tuple[list[Column], str]:
+    """Columns of a header, and the parentheses of a row with one mark for each cell; "" for a row that needs none."""
+    time, header = Column("Time", "", "time"), top.columns
+    if top.probes:
+        parts = ("_x", "_y", "_z") if top.vectors else ("",)
+        columns = [time, *(Column(f"value{p}(probe {k})") for k in top.probes for p in parts)]
+        return columns, "n" + ("(nnn)" if top.vectors else "n") * len(top.probes)
+    nested = _NESTED.findall(header)
     if nested and all(re.fullmatch(r"(local)?(forces?|moments?)", name, re.IGNORECASE) for name, _ in nested):
         groups = [(name.lower().removesuffix("s"), re.split(r"[,\s]+", parts.strip())) for name, parts in nested]
         names = [f"{name}_{part}_{axis}" for name, parts in groups for part in parts for axis in "xyz"]
-        return [time, *map(_load, names)], groups
+        return [time, *map(_load, names)], "n" + "".join(f"({'(nnn)' * len(parts)})" for _, parts in groups)
     names = _VECTOR.sub(r"\1", header).split()
-    kind = title.strip().lower().removesuffix("s")
+    kind = top.title.strip().lower().removesuffix("s")
     if kind in ("force", "moment") and all(re.fullmatch(r"\w+_[xyz]", name) for name in names):
-        return [time, *(_load(f"{kind}_{name}") for name in names)], []
-    return [time, *map(Column, names)], []
+        return [time, *(_load(f"{kind}_{name}") for name in names)], ""
+    return [time, *map(Column, names)], ""
 
 
 def _load(name: str) -> Column:
@@ -112,25 +119,24 @@ def read(path: str | os.PathLike[str]) -> Dataset:
         if text.startswith("#"):
             top.take(line, text)
         elif text and not top.columns:
-            expected = "a header such as # Time total_x total_y total_z"
-            source.refuse(line, repr(text[:60]), expected, "Is the header damaged?")
+            source.refuse(line, repr(text[:60]), _EXPECTED, "Is the header damaged?")
         elif text:
             rows.append((line, text))
-    header, about, probes = top.columns, {"title": top.title, **top.settings}, top.probes
+    header, about = top.columns, {"title": top.title, **top.settings}
     if not header:
-        source.refuse("", "no header", "a header such as # Time total_x total_y total_z")
+        source.refuse("", "no header", _EXPECTED)
     if "bins" in about or re.search(r"\[\d+\]\(|_\d+_[xyz]\b", header):
         hint = "Their sum is in the forces (or force and moment) file in the same folder"
         source.refuse("", "forces in bins along a direction", "forces of the whole", hint)
     notes = [f"header repeated {number_of(top.repeated, 'time')}: the run was restarted"] if top.repeated else []
-    if header.split()[0] == "patch":
+    if header.split()[0] == "patch" and not top.probes:
         return _by_patch(source, header.split(), rows, about, notes)
-    if probes:
-        return _probes(source, probes, rows, notes)
-    columns, groups = _columns(header, top.title)
-    table = numeric_table(source, columns, _rows(rows, len(columns), groups), commas=False)
-    if groups:
-        columns, table = _totals(columns, table, groups)
+    top.vectors = bool(top.probes and rows) and "(" in rows[0][1]
+    columns, shape = _columns(top)
+    table = numeric_table(source, columns, [_row(line, text, shape, len(columns)) for line, text in rows], commas=False)
+    if top.probes:
+        where = "; ".join(f"probe {k} at ({at})" for k, at in top.probes.items())
+        about, notes = {"title": "probes", "probes": where}, [*notes, "the file states no unit"]
     if {"KT", "10*KQ"} <= {c.name for c in columns}:
         own = [_PROPELLER.get(c.name, (c.name, c.unit, 1.0)) for c in columns]
         table = replace(table, values=table.values * np.array([factor for _, _, factor in own]))
@@ -138,35 +144,13 @@ def read(path: str | os.PathLike[str]) -> Dataset:
     return _record(source, columns, table, about, notes)
 
 
-def _rows(rows: Sequence[tuple[int, str]], width: int, groups: list[tuple[str, list[str]]]) -> list[ExportRow]:
-    """Cells of the rows; a row with other parentheses than its header has gets none, so that it is not shifted."""
-    out = []
-    wanted = "n" + "".join(f"({'(nnn)' * len(parts)})" for _, parts in groups)
-    for line, text in rows:
-        cells, shape = _cells(text)
-        if (shape != wanted if groups else shape.replace("(nnn)", "nnn") != "n" * len(cells)) and len(cells) == width:
-            cells = (*cells[:-1], _DAMAGED)
-        out.append(ExportRow(line, cells))
-    return out
-
-
-def _totals(
-    columns: list[Column], table: ExportTable, groups: list[tuple[str, list[str]]]
-) -> tuple[list[Column], ExportTable]:
-    """Add the totals that the old layout does not have."""
-    new: list[Column] = []
-    sums = []
-    at = 1
-    for name, parts in groups:
-        block = table.values[:, at : at + 3 * len(parts)].reshape(len(table.values), len(parts), 3)
-        unit = columns[at].unit
-        for k, axis in enumerate("xyz"):
-            new.append(Column(f"{name}_total_{axis}_{unit}", unit))
-            with np.errstate(over="ignore", invalid="ignore"):
-                total = block[:, :, k].sum(axis=1)
-            sums.append(np.where(np.isfinite(total), total, np.nan))
-        at += 3 * len(parts)
-    return [*columns, *new], replace(table, values=np.column_stack([table.values, *sums]))
+def _row(line: int, text: str, shape: str, width: int) -> ExportRow:
+    """Cells of a row; one with other parentheses than its header has is damaged, so that it is not shifted."""
+    parts = re.findall(r"[()]|[^()\s]+", text)
+    cells = tuple(p for p in parts if p not in "()")
+    own = "".join(p if p in "()" else "n" for p in parts)
+    right = own == shape if shape else own.replace("(nnn)", "nnn") == "n" * len(cells)
+    return ExportRow(line, cells if right or len(cells) != width else (*cells[:-1], "damaged parentheses"))
 
 
 def _record(
@@ -182,8 +166,7 @@ def _record(
     if any(c.unit in ("N", "Nm") for c in columns):
         notes.append("newtons only if rhoInf was the density; if not: --reference density=RHOINF --density-kg-m3 RHO")
         notes.append("of the patches of the function object: of one of N sectors, --sector N")
-        for axis in "xyz":
-            notes += _balance(columns, table, axis)
+        columns, table = _totals(columns, table, notes)
     elif "magUInf" in about or any(c.name in ("Cd", "Cl", "CmPitch") for c in columns):
         settings = ", ".join(f"{k} {about[k]}" for k in ("magUInf", "lRef", "Aref") if k in about)
         told = f": {settings}" if settings else " that the file does not state"
@@ -191,22 +174,24 @@ def _record(
     return history(KIND, source, columns, table, notes, about)
 
 
-def _balance(columns: list[Column], table: ExportTable, axis: str) -> list[str]:
-    """Total against the sum of its parts, where all are recorded: shows swapped or damaged columns."""
-    notes = []
-    by_name = {c.name: table.values[:, k] for k, c in enumerate(columns)}
-    for base, unit in (("force", "N"), ("moment", "Nm")):
-        total, pressure, viscous, porous, internal = (by_name.get(f"{base}_{part}_{axis}_{unit}") for part in _PARTS)
-        if total is None or pressure is None or viscous is None:
-            continue
-        third = internal if porous is None else porous
+def _totals(columns: list[Column], table: ExportTable, notes: list[str]) -> tuple[list[Column], ExportTable]:
+    """Sums over pressure, viscous and porous: added in the old layout, compared with the totals of the new one."""
+    loads = [(m, k) for k, c in enumerate(columns) if (m := _PART.fullmatch(c.name))]
+    by_name = {m[0]: table.values[:, k] for m, k in loads}
+    more: dict[Column, Array] = {}
+    for base, axis, unit in dict.fromkeys((m["base"], m["axis"], m["unit"]) for m, _ in loads):
+        own = {m["part"]: by_name[m[0]] for m, _ in loads if (m["base"], m["axis"]) == (base, axis)}
+        total, name = own.pop("total", None), f"{base}_total_{axis}_{unit}"
         with np.errstate(over="ignore", invalid="ignore"):
-            sums = pressure + viscous + (0.0 if third is None else third)
-            off = np.flatnonzero(np.abs(total - sums) > 1e-4 * (np.abs(pressure) + np.abs(viscous)))
-        if off.size:
-            where = f"{number_of(off.size, 'row')} (first: line {table.lines[off[0]]})"
-            notes.append(f"{base}_total_{axis}_{unit} is not the sum of its parts in {where}")
-    return notes
+            whole = np.sum([*own.values()], axis=0) if own else np.nan
+            if total is None:
+                more[Column(name, unit)] = np.where(np.isfinite(whole), whole, np.nan)
+            elif {"pressure", "viscous"} <= own.keys():
+                size = np.abs(own["pressure"]) + np.abs(own["viscous"])
+                off = np.flatnonzero(np.abs(total - whole) > 1e-4 * size)
+                where = f"{number_of(off.size, 'row')} (first: line {table.lines[off[0]]})" if off.size else ""
+                notes += [f"{name} is not the sum of its parts in {where}"] if where else []
+    return [*columns, *more], replace(table, values=np.column_stack([table.values, *more.values()]))
 
 
 def _by_patch(
@@ -218,37 +203,16 @@ def _by_patch(
     for line, text in rows:
         cells = text.split()
         patches.setdefault(cells[1] if len(cells) > 1 else "?", []).append(ExportRow(line, (cells[0], *cells[2:])))
-    channels: dict[str, Channel] = {}
-    prefix = "y_plus" if "y+" in about.get("title", "") else about.get("title", "").strip() or "value"
-    for patch, data in patches.items():
-        record = history(KIND, source, columns, numeric_table(source, columns, data, commas=False))
-        notes += [f"{patch}: {text}" for text in record.notes]
-        for name in names[1:]:
-            values = record[name]
-            mean = Mean(float(values[-1]), "last row") if np.isfinite(values[-1]) else None
-            channels[f"{prefix}_{name}({patch})"] = Channel(values, "", mean)
-    if not channels:
+    if not patches:
         source.refuse("", "no rows", "one patch or more")
-    about = {**source.about, **about, "clock": "none"}
-    return dataset(KIND, "cfd", channels, notes, about)
-
-
-def _probes(source: SourceText, probes: dict[str, str], rows: Sequence[tuple[int, str]], notes: list[str]) -> Dataset:
-    """Field at points over time: one channel for each probe and component; the field is named by the file's name."""
-    vector = bool(rows) and "(" in rows[0][1]
-    parts = ("_x", "_y", "_z") if vector else ("",)
-    columns = [Column("Time", "", "time"), *(Column(f"value{p}(probe {k})") for k in probes for p in parts)]
-    wanted = "n" + ("(nnn)" if vector else "n") * len(probes)
-    cells = []
-    for line, text in rows:
-        row, shape = _cells(text)
-        cells.append(ExportRow(line, row if shape == wanted else (*row[:-1], _DAMAGED)))
-    table = numeric_table(source, columns, cells, commas=False)
-    where = "; ".join(f"probe {k} at ({at})" for k, at in probes.items())
-    return _record(source, columns, table, {"title": "probes", "probes": where}, [*notes, "the file states no unit"])
-
-
-def _cells(text: str) -> tuple[tuple[str, ...], str]:
-    """Cells of a row, and its parentheses with one mark for each cell."""
-    parts = re.findall(r"[()]|[^()\s]+", text)
-    return tuple(p for p in parts if p not in "()"), "".join(p if p in "()" else "n" for p in parts)
+    tables = {
+        p: history(KIND, source, columns, numeric_table(source, columns, own, False)) for p, own in patches.items()
+    }
+    found, more = side_by_side(tables.items())
+    prefix = "y_plus" if "y+" in about.get("title", "") else about.get("title", "").strip() or "value"
+    channels: dict[str, Channel] = {}
+    for name, c in found.items():
+        if not name.startswith("Time("):
+            last = float(c.values[-1])
+            channels[f"{prefix}_{name}"] = Channel(c.values, "", Mean(last, "last row") if np.isfinite(last) else None)
+    return dataset(KIND, "cfd", channels, [*notes, *more], {**source.about, **about, "clock": "none"})

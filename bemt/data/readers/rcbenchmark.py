@@ -32,7 +32,7 @@ from bemt.base.tables import number_of
 from bemt.data.readers import head_text, number
 from bemt.data.readers._large import NumberTable
 from bemt.data.readers.headings import heading
-from bemt.data.readers.recording import Builder, Remark, slip
+from bemt.data.readers.recording import Builder, Remark
 from bemt.data.readers.samples import MISREAD, MOST_RPM_PER_V, against_load, spikes
 from bemt.data.readers.split import SplitTable
 from bemt.physics.dataset import Dataset
@@ -86,7 +86,10 @@ def read(path: str | os.PathLike[str]) -> Dataset:
     if said["mode"] == "continuous":
         build.flag_spikes("thrust_N", "torque_Nm", "current_A", "voltage_V")
     build.check_magnitudes()
-    _sign(build)
+    for name in ("thrust_N", "torque_Nm"):
+        v = build.at(name)
+        if v is not None and np.any(np.isfinite(v)) and -np.nanmin(v) > 2.0 * max(np.nanmax(v), 0.0):
+            build.warnings.append(f"{name} is mostly negative: another sign convention? The sign was not changed")
     return build.finish(said)
 
 
@@ -199,37 +202,16 @@ def _wild(v: Array, load: Array | None) -> np.ndarray:
 
 
 def _power(build: Builder) -> None:
-    """Tell which speed the mechanical power was computed with, and whether the units agree."""
+    """Tell which speed the mechanical power was computed with; the sanity checks look at its size."""
     power, torque = build.at("mechanical_power_W"), build.at("torque_Nm")
-    volt, ampere, electric = build.at("voltage_V"), build.at("current_A"), build.at("electrical_power_W")
     same: list[str] = []
     for name in (*_SPEEDS, "rpm"):
         speed = build.at(name)
         if power is None or torque is None or speed is None:
             continue
-        ratio = _times(power, np.abs(torque) * speed * units.RPM, power > 0)
-        if ratio is not None and math.isclose(ratio, 1.0, rel_tol=0.02):
+        product = np.abs(torque) * speed * units.RPM
+        good = (product > 0.05 * np.nanmax(np.append(product, 0.0))) & (power > 0)
+        if np.count_nonzero(good) >= 3 and math.isclose(np.median(power[good] / product[good]), 1.0, rel_tol=0.02):
             same.append(name)
-        elif ratio is not None and (name == "optical_rpm" or "optical_rpm" not in build.channels):
-            text = f"mechanical_power_W is {ratio:.4g} times torque x {name}{slip(ratio)}"
-            build.warnings.append(text + "; nothing was converted")
     if same:
         build.warnings.append(Remark(f"mechanical_power_W is torque times {' and '.join(same)}"))
-    if volt is not None and ampere is not None and electric is not None:
-        ratio = _times(electric, volt * ampere)
-        if ratio is not None and abs(ratio - 1.0) > 0.1:
-            text = f"electrical_power_W is {ratio:.4g} times voltage x current{slip(ratio)}"
-            build.warnings.append(text + "; nothing was converted")
-
-
-def _times(power: Array, product: Array, used: np.ndarray | bool = True) -> float | None:
-    """Median of a power over the product of its factors in the rows that carry load; None: fewer than three."""
-    good = (product > 0.05 * np.nanmax(np.append(product, 0.0))) & used
-    return float(np.median(power[good] / product[good])) if np.count_nonzero(good) >= 3 else None
-
-
-def _sign(build: Builder) -> None:
-    for name in ("thrust_N", "torque_Nm"):
-        v = build.at(name)
-        if v is not None and np.any(np.isfinite(v)) and -np.nanmin(v) > 2.0 * max(np.nanmax(v), 0.0):
-            build.warnings.append(f"{name} is mostly negative: another sign convention? The sign was not changed")

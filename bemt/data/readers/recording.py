@@ -18,13 +18,13 @@ from typing import Any
 
 import numpy as np
 
-from bemt.base import unit_errors
+from bemt.base import unit_errors, units
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, refuse
 from bemt.base.tables import number_of
 from bemt.data.readers import load_text
 from bemt.data.readers._large import NumberTable
-from bemt.data.readers._words import english, quantities
+from bemt.data.readers._words import DIMENSIONS, english, quantities
 from bemt.data.readers.headings import (
     CELLS,
     Heading,
@@ -416,7 +416,7 @@ def _nearest(headings: Sequence[str], channels: Iterable[str] = ()) -> str:
     >>> _nearest(["'Trust'", "'x'"])  # doctest: +ELLIPSIS
     '; nearest meaning: \'Trust\' thrust. The line: [columns] thrust = { column = "Trust", unit = "..." }, unit N, ...'
     >>> _nearest(["'speed'"], ["airspeed_m_s"])  # doctest: +ELLIPSIS
-    '; nearest meaning: \'speed\' rpm. The line: [columns] rpm = { column = "speed", unit = "..." }, unit rpm, ...'
+    '; nearest meaning: \'speed\' rpm. The line: [columns] rpm = { column = "speed", unit = "..." }, unit rad_s, ...'
     """
     near: dict[str, list[str]] = {}
     for label in headings:
@@ -431,18 +431,11 @@ def _nearest(headings: Sequence[str], channels: Iterable[str] = ()) -> str:
     if not near:
         return ""
     name, meanings = next(iter(near.items()))
-    lines = [f'{m} = {{ column = "{name}", unit = "..." }}, unit {_UNITS_MEANT[m]}' for m in meanings]
+    lines = [
+        f'{m} = {{ column = "{name}", unit = "..." }}, unit {some(units.suffixes(DIMENSIONS[m]), 5)}' for m in meanings
+    ]
     told = ", ".join(f"{k!r} {' or '.join(v)}" for k, v in near.items())
     return f"; nearest meaning: {told}. The line: [columns] {', or '.join(lines)}"
-
-
-_UNITS_MEANT = {
-    "rpm": "rpm, krpm, rev_s or rad_s", "thrust": "N, kgf, gf, lbf or ozf", "voltage": "V or mV",
-    "torque": "Nm, mNm, kgf_cm, gf_cm or lbf_in", "current": "A or mA", "power": "W or kW", "time": "s or ms",
-    "airspeed": "m_s, km_h, kt or mph", "throttle": "pct", "pressure": "Pa, hPa or mbar", "temperature": "C, K or F",
-    "density": "kg_m3", "humidity": "pct",
-}  # fmt: skip
-"""Units that a column of each meaning usually has; which, the file does not say."""
 
 
 def _speeds_meant(name: str, channels: Iterable[str]) -> list[str]:

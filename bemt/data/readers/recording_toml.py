@@ -374,18 +374,10 @@ def _join(runs: list[Dataset], files: Sequence[str]) -> Dataset:
     if len(runs) == 1:
         return runs[0]
     whole = concat(runs, "+".join(files))
-    own = {name: {run.unit(name) for run in runs if name in run} for name in whole.values}
-    texts = {
-        name: sum((run.texts.get(name, ("",) * len(run)) for run in runs), ())
-        for name in dict.fromkeys(n for run in runs for n in run.texts)
-    }
     about = {
         "file": whole.name, "sha256": "+".join(run.provenance["sha256"] for run in runs), "format": KIND,
         "headings": {k: v for run in runs for k, v in run.headings.items()},
     }  # fmt: skip
-    return replace(
-        whole, values={**whole.values, "run": np.repeat(np.arange(1.0, len(runs) + 1.0), [len(run) for run in runs])},
-        units={**whole.units, **{name: "" for name, units_ in own.items() if len(units_) > 1}}, provenance=about,
-        lines=sum((tuple(run.lines) for run in runs), ()), texts=texts,
-        notes=tuple(f"{file}: {text}" for file, run in zip(files, runs, strict=True) for text in run.notes),
-    )  # fmt: skip
+    number = np.repeat(np.arange(1.0, len(runs) + 1.0), [len(run) for run in runs])
+    notes = tuple(f"{file}: {text}" for file, run in zip(files, runs, strict=True) for text in run.notes)
+    return replace(whole, values={**whole.values, "run": number}, provenance=about, notes=notes)

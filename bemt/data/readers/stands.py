@@ -1,4 +1,4 @@
-"""Stands and databases whose files are odd: thrust_tool, a coaxial stand, Drive Calculator.
+"""Stands and databases by name: thrust_tool, a coaxial stand, Drive Calculator, a Crazyflie on a scale.
 
 Tables of the thrust_tool stand (J. Majewski), throttle steps with an error per channel, have one row per throttle
 step and headings without units::
@@ -17,7 +17,8 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -168,41 +169,15 @@ def _check_raw(build: Builder) -> None:
 # Coaxial Rotor Systems). If only one side turned, its columns get the plain names; two that turned keep ``left`` and
 # ``right``. The first row is read before the tare: its loads are left out.
 
-COAXIAL_STAND = "coaxial_stand"
 _SIDES = ("left", "right")
-_COAXIAL_STAND_COLUMNS = {
+_COAXIAL_COLUMNS = {
     "PWM": ("pulse_width", "us"), "Thrust": ("thrust", "gf"), "Torque": ("torque", "Nm"), "Voltage": ("voltage", "V"),
     "Current": ("current", "A"), "Speed": ("", "rpm"),
 }  # fmt: skip
-_HEAD = re.compile(r"(PWM|Thrust|Torque|Voltage|Current|Speed) (Left|Right)(?: \[[^\]]*\])?")
 _DIAMETER = re.compile(r"(?:^|_)(\d+(?:\.\d+)?)in_")
 
 
-def sniff_coaxial_stand(head: bytes | str) -> bool:
-    r"""Tell whether the first line names both sides of this stand.
-
-    >>> sniff_coaxial_stand("PWM Left,PWM Right,Thrust Left [g],Thrust Right [g],Speed Left [rpm],Speed Right [rpm]\n")
-    True
-    """
-    found = {m.groups() for c in first_cells(head) if (m := _HEAD.fullmatch(c))}
-    return {(what, side) for what in ("PWM", "Thrust", "Speed") for side in ("Left", "Right")} <= found
-
-
-def read_coaxial_stand(path: str | os.PathLike[str]) -> Dataset:
-    """Read a table."""
-    build = Builder.of_stand(path, COAXIAL_STAND)
-    for k, text in enumerate(build.table.headings):
-        if found := _HEAD.fullmatch(text.strip()):
-            name, unit = _COAXIAL_STAND_COLUMNS[found[1]]
-            build.add_usual(k, f"{name}_{found[2].lower()}".lstrip("_"), unit)
-        elif re.fullmatch(r"Time(?: \[[^\]]*\])?", text.strip()):
-            build.add_usual(k, "time", "s")
-    build.check()
-    needed = [f"{k}_{side}_{unit}" for k, unit in (("pulse_width", "s"), ("thrust", "N")) for side in _SIDES]
-    for name in (*needed, *(f"{side}_rpm" for side in _SIDES)):
-        if name not in build.channels:
-            build.fault(name, "an empty column", "numbers")
-    build.check()
+def _coaxial(build: Builder) -> Dataset:
     _tare_row(build)
     for side in _SIDES:
         _turned_positive(build, side)
@@ -310,8 +285,82 @@ def _check(build: Builder, law: str, exponent: str, at: str, target: float) -> N
         build.warnings.append(text + ("" if share > 0.5 else ": its unit is in doubt"))
 
 
-READERS = (
+# Bench tables of a Crazyflie on a scale: total thrust of four propellers, their optical speeds, command and battery.
+#
+# Columns ``pwm`` (0 to 65535), ``vbat[V]``, ``rpm1`` to ``rpm4``, ``weight`` or ``weight[g]`` or ``thrust[g]`` (total,
+# in gram-force), and with a power analyser ``v[V]``, ``i[A]``, ``p[W]`` of the supply (tables of Bitcraze and of IMRC,
+# TU Berlin). Loads are per propeller: a fourth of the total, at the root mean square of the four speeds, since thrust
+# goes with the square.
+
+FULL = 65535.0
+"""Largest command. [counts]"""
+_SPEEDS = ("1_rpm", "2_rpm", "3_rpm", "4_rpm")
+
+
+def _crazyflie(build: Builder) -> Dataset:
+    build.channels["throttle"] = Channel(build.channels["throttle"].values * (1.0 / FULL), "-")
+    build.declared["throttle"] = 1.0 / FULL
+    speeds = np.array([build.channels.pop(name).values for name in _SPEEDS])
+    build.channels["rpm"] = Channel(np.sqrt(np.mean(speeds**2, axis=0)), "rpm")
+    build.channels["thrust_N"] = Channel(build.channels.pop("total_thrust_N").values / 4.0, "N")
+    if (power := build.channels.pop("supply_power_W", None)) is not None:
+        build.channels["electrical_power_W"] = Channel(power.values / 4.0, "W")
+    build.headings = {k: v for k, v in build.headings.items() if k in build.channels}
+    build.flag_speeds("rpm")
+    with np.errstate(invalid="ignore"):
+        spread = np.ptp(speeds, axis=0) > 0.25 * np.maximum(speeds.max(axis=0), 1.0)
+    build.flag(np.flatnonzero(spread), "speeds of the four propellers differ by more than a quarter")
+    build.warnings.append("loads are a fourth of the total of four propellers, at the rms of their speeds")
+    build.warnings.append("weight and thrust are taken as gram-force; air density is not in the file")
+    return build.finish({"stand": "Crazyflie on a scale"})
+
+
+# Stands whose tables have columns of known names: what is their own follows when the columns are read.
+
+
+@dataclass(frozen=True)
+class Stand:
+    """A reader of the tables of one stand."""
+
+    KIND: str
+    marks: tuple[set[str], ...]  # Headings without their units that tell it: all of one of these sets
+    columns: Mapping[str, tuple[str, str]]  # Heading without its unit: name of the channel, usual unit
+    needs: tuple[str, ...]
+    finish: Callable[[Builder], Dataset]
+
+    def sniff(self, head: bytes | str) -> bool:
+        """Tell whether the first line has this stand's headings."""
+        cells = set(map(_base, first_cells(head)))
+        return any(mark <= cells for mark in self.marks)
+
+    def read(self, path: str | os.PathLike[str]) -> Dataset:
+        """Read a table."""
+        build = Builder.of_stand(path, self.KIND)
+        for k, text in enumerate(build.table.headings):
+            if usual := self.columns.get(_base(text)):
+                build.add_usual(k, *usual)
+        build.check()
+        build.need(*self.needs)
+        build.check()
+        return self.finish(build)
+
+
+READERS: tuple[Reader | Stand, ...] = (
     Reader(JMAJEW, sniff_jmajew, read_jmajew),
-    Reader(COAXIAL_STAND, sniff_coaxial_stand, read_coaxial_stand),
     Reader(DRIVECALC, lambda head: first_cells(head) >= _PROPELLERS or first_cells(head) >= _POINTS, read_drivecalc),
-)
+    Stand(
+        "coaxial_stand", ({f"{what} {side}" for what in ("PWM", "Thrust", "Speed") for side in ("Left", "Right")},),
+        {f"{what} {side.title()}": (f"{name}_{side}".lstrip("_"), unit)
+         for what, (name, unit) in _COAXIAL_COLUMNS.items() for side in _SIDES} | {"Time": ("time", "s")},
+        tuple(f"{name}{side}{unit}" for name, unit in (("pulse_width_", "_s"), ("thrust_", "_N"), ("", "_rpm"))
+              for side in _SIDES),
+        _coaxial,
+    ),
+    Stand(
+        "crazyflie_bench", tuple({"pwm", "rpm1", "rpm2", "rpm3", "rpm4", load} for load in ("weight", "thrust")),
+        {"pwm": ("throttle", "-"), "vbat": ("voltage", "V"), "v": ("supply_voltage", "V"),
+         "i": ("supply_current", "A"), "p": ("supply_power", "W"), "weight": ("total_thrust", "gf"),
+         "thrust": ("total_thrust", "gf"), **{f"rpm{k}": (str(k), "rpm") for k in (1, 2, 3, 4)}},
+        ("total_thrust_N", "throttle", *_SPEEDS), _crazyflie,
+    ),
+)  # fmt: skip

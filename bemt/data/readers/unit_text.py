@@ -61,7 +61,7 @@ _COMPOUND = {
     "uNm": units.Unit("", "torque", 1e-6), "PS": units.Unit("", "power", 75.0 * units.KGF),
     "ch": units.Unit("", "power", 75.0 * units.KGF),
 }  # fmt: skip
-_MOJIBAKE = (("Âµ", "µ"), ("Î¼", "µ"), ("Â·", "·"), ("â‹…", "·"), ("Â°", "°"), ("Â²", "²"), ("Â³", "³"))
+_MOJIBAKE = (("Âµ", "µ"), ("Âμ", "µ"), ("Î¼", "µ"), ("Â·", "·"), ("â‹…", "·"), ("Â°", "°"), ("Â²", "²"), ("Â³", "³"))
 """UTF-8 that a program took for Latin-1 or its Windows form."""
 WEIGHTS = {
     "g": "gf", "G": "gf", "grams": "gf", "gram": "gf", "gr": "gf", "gramm": "gf", "kg": "kgf", "Kg": "kgf", "KG": "kgf",
@@ -132,6 +132,8 @@ def unit_for(dimension: str, text: str) -> tuple[units.Unit, str] | None:
         made = unit_of(weight)
         assert isinstance(made, units.Unit)
         return made, f"{weight.replace(' ', ' times ')}: a weight, as stands mean it"
+    if dimension == "acceleration" and text == "g":
+        return units.Unit("m_s2", dimension, units.G0), ""
     if not isinstance(found, units.Unit):
         found = units.UNITS.get(_ANY_CASE.get(text.lower(), ""), "")
     return (found, "") if isinstance(found, units.Unit) and found.dimension == dimension else None

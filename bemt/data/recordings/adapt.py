@@ -13,10 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from bemt.base.averaging import Average, Mean, keep_last, revolution_average
+from bemt.base.averaging import Mean, keep_last, revolution_average
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.packed import packed, part_of, unpacked
-from bemt.base.tables import number_of
 from bemt.data.readers import load_bytes, polars_c81, uiuc
 from bemt.data.readers.apc import ApcPerformance
 from bemt.data.readers.references import Reference
@@ -304,7 +303,7 @@ def averaged(record: Dataset, period: float, revolutions: int | None = None) -> 
         if average.problem:
             problems.setdefault(average.problem, []).append(key)
         if average.mean is not None:
-            means[key] = Mean(average.mean, _span(average), average.drift)
+            means[key] = Mean(average.mean, average.span, average.drift)
     more = [
         f"{'no mean' if 'only' not in text else 'doubtful mean'} of {', '.join(keys)}: {text}"
         for text, keys in problems.items()
@@ -313,11 +312,6 @@ def averaged(record: Dataset, period: float, revolutions: int | None = None) -> 
         worst = ", ".join(f"{key} {value:.2%}" for key, value in list(scatter.items())[:6])
         more.append(f"means of single revolutions differ: {worst}")
     return replace(record, provenance={**record.provenance, "means": means}, notes=(*record.notes, *notes, *more))
-
-
-def _span(average: Average) -> str:
-    turns = f"{average.revolutions} revolution" + ("s" if average.revolutions > 1 else "")
-    return f"last {turns} ({average.start:.6g} to {average.end:.6g} s, {number_of(average.rows, 'row')})"
 
 
 def asked(rpm: float | None = None, period: float | None = None, revolutions: int | None = None) -> Choice:

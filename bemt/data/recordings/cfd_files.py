@@ -12,7 +12,6 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.base.averaging import MIN_ROWS, keep_last, relation, revolution_average, steady_average
 from bemt.base.errors import Fault, InputError
-from bemt.base.tables import number_of
 from bemt.data import readers
 from bemt.data.readers.split import some
 from bemt.physics.dataset import Dataset
@@ -68,11 +67,8 @@ def cfd_files(folder: Path) -> tuple[Path, ...]:
 
 def zone_of(path: Path, form: str) -> str:
     """Function object of a file of OpenFOAM, which writes name/time/file."""
-    try:
-        float(path.parent.name)
-    except ValueError:
-        return ""
-    return path.parent.parent.name if form == "openfoam_forces" else ""
+    timed = form == "openfoam_forces" and readers.number(path.parent.name) is not None
+    return path.parent.parent.name if timed else ""
 
 
 def read_run(paths: Sequence[Path]) -> tuple[list[tuple[str, Dataset]], list[Fault]]:
@@ -182,10 +178,8 @@ def settled(
             return found.problem
         turns = np.array(found.per_revolution)
         scatter = float(np.std(turns, ddof=1) / math.sqrt(turns.size)) if turns.size > 1 else 0.0
-        word = f"{found.revolutions} revolution" + ("s" if found.revolutions > 1 else "")
-        over = f"last {word}, {found.start:.6g} to {found.end:.6g} s ({number_of(found.rows, 'row')})"
         wide = (np.ptp(turns) / abs(found.mean) if turns.size and found.mean else 0.0) > SCATTERED
-        over += "; revolutions differ by more than 2 %" if wide else ""
+        over = found.span + ("; revolutions differ by more than 2 %" if wide else "")
         return Settled(np.array([found.mean]), (found.drift or 0.0) * abs(found.mean), scatter, over)
     if clock == "iteration":
         found = steady_average(values)

@@ -219,10 +219,8 @@ def _split(texts: Sequence[str]) -> list[str]:
 def _numbers(texts: Sequence[str], faults: list[Fault]) -> Told:
     out: Told = {}
     for name, text in pairs("--reference", _split(texts), faults).items():
-        key = _REFERENCE.get(name, name)
-        try:
-            out[key] = float(text)
-        except ValueError:
+        out[_REFERENCE.get(name, name)] = value = number(text)
+        if value is None:
             faults.append(Fault("", "--reference", f"{name}={text}", f"a number for one of {', '.join(_REFERENCE)}"))
     return out
 

@@ -310,9 +310,7 @@ def by_grid(d: CfdRun, cells: Array, size_unit: str | None = None) -> CfdRun:
     random = d.u_by.get("random", d.u)
     values, u, grid = ({k: v[rows] for k, v in table.items()} for table in (d.values, random, sizes))
     labels = tuple(d.labels[i] for i in rows if d.labels)
-    made = CfdRun("cfd", d.name, values, u, (), d.provenance, labels, notes=d.notes, files=d.files, conditions=told,
-                  averaged=d.averaged, drift=d.drift, units_given=d.units_given, studies=tuple(studies),
-                  zones=d.zones, elsewhere=d.elsewhere)  # fmt: skip
+    made = replace(d, values=values, u=u, u_by={}, flags=(), labels=labels, conditions=told, studies=tuple(studies))
     return with_grid_floor(made, grid, tuple(s.sentence() for s in studies))
 
 
@@ -367,9 +365,8 @@ def together(parts: Sequence[Dataset], name: str = "") -> CfdRun:
     joined = concat([replace(d, kind="cfd", u=d.u_by.get("random", d.u), u_by={}) for d in parts])
     name = name or f"{finest.name} and {len(parts) - 1} coarser"
     files = tuple(f for d in runs for f in d.files)
-    whole = CfdRun("cfd", name, joined.values, joined.u, (), about, notes=notes, files=files,
-                   conditions=finest.conditions, averaged=finest.averaged, drift=finest.drift,
-                   units_given=finest.units_given, zones=finest.zones, elsewhere=finest.elsewhere)  # fmt: skip
+    whole = replace(finest, name=name, values=joined.values, u=joined.u, u_by={}, flags=(), labels=(),
+                    provenance=about, notes=notes, files=files, studies=())  # fmt: skip
     return by_grid(whole, np.repeat(cells, [len(d) for d in parts]))
 
 

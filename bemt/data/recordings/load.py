@@ -159,21 +159,10 @@ def _earlier(path: Path, paths: Sequence[str], records: Mapping[str, Dataset]) -
         base = path.with_name(match[1] + (match[3] or ""))
         known = [p for p in paths if Path(p) == base]
         return known or ([str(base)] if base.is_file() else [])
-    if records[str(path)].format == "openfoam_forces":
-        try:
-            start = float(path.parent.name)
-        except ValueError:
-            return []
-        return [p for p in paths if p != str(path) and p in records and Path(p).name == path.name
-                and Path(p).parent.parent == path.parent.parent and _before(Path(p).parent.name, start)]  # fmt: skip
-    return []
-
-
-def _before(name: str, start: float) -> bool:
-    try:
-        return float(name) < start
-    except ValueError:
-        return False
+    start = importers.number(path.parent.name) if records[str(path)].format == "openfoam_forces" else None
+    parts = {p: importers.number(Path(p).parent.name) for p in paths if p in records and Path(p).name == path.name
+             and Path(p).parent.parent == path.parent.parent}  # fmt: skip
+    return [p for p, at in parts.items() if start is not None and at is not None and at < start]
 
 
 def import_files(

@@ -145,13 +145,7 @@ def _joined(parts: Sequence[Dataset]) -> Dataset:
         "dropped": sum((dropped(v) for v in parts), ()),
         "names": {a: b for v in parts for a, b in v.provenance["names"].items()},
     }
-    return replace(
-        whole,
-        values={**whole.values, "run": np.concatenate(run)},
-        provenance=about,
-        notes=tuple(dict.fromkeys(n for v in parts for n in v.notes)),
-        lines=sum((tuple(v.lines) for v in parts), ()),
-    )
+    return replace(whole, values={**whole.values, "run": np.concatenate(run)}, provenance=about)
 
 
 def _trusted(rec: Dataset) -> Dataset:

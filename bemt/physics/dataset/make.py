@@ -33,7 +33,8 @@ def concat(series: Iterable[Dataset], name: str | None = None) -> Dataset:
     Returns
     -------
     Dataset
-        All channels of all; NaN where a part lacks one. ``provenance["parts"]`` lists (name, points, provenance).
+        All channels of all; NaN where a part lacks one, unit "" where two differ; notes, lines and texts of all.
+        ``provenance["parts"]`` lists (name, points, provenance).
 
     Raises
     ------
@@ -66,8 +67,13 @@ def concat(series: Iterable[Dataset], name: str | None = None) -> Dataset:
         sum((part.flags for part in parts), ()),
         {"parts": tuple((part.name, len(part), dict(part.provenance)) for part in parts)},
         sum((part.labels or ("",) * len(part) for part in parts), ()) if any(part.labels for part in parts) else (),
-        units={key: unit for part in parts for key, unit in part.units.items()},
-    )
+        notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
+        units={key: unit for part in parts for key, unit in part.units.items()}
+        | {key: "" for key in channels if len({part.unit(key) for part in parts if key in part}) > 1},
+        lines=sum((tuple(part.lines) for part in parts), ()) if all(part.lines for part in parts) else (),
+        texts={key: sum((part.texts.get(key, ("",) * len(part)) for part in parts), ())
+               for key in dict.fromkeys(key for part in parts for key in part.texts)},
+    )  # fmt: skip
 
 
 def from_pandas(frame: pd.DataFrame, kind: str = "bench", name: str = "table", **more: Any) -> Dataset:
