@@ -348,19 +348,19 @@ class Drive:
         full = self.steady(self.esc.pulse_max_us, soc, temperature_C)
         reached = full.thrust_N >= thrust_N
         top = np.where(reached, full.rpm * math.pi / 30.0, 0.0)
-        omega = _least(lambda w: self.rotor.thrust(w) >= thrust_N, np.zeros(soc.shape), top)[:, None]
+        omega = _least(lambda w: np.asarray(self.rotor.thrust(w) >= thrust_N), np.zeros(soc.shape), top)[:, None]
         warm = np.asarray(self.motor.ambient_C if temperature_C is None else temperature_C, dtype=float)
         voc, wanted = self.battery.voc(soc)[:, None], self.rotor.torque(omega)
 
-        def holds(pulse: Array) -> Array:
+        def holds(pulse: Array) -> NDArray[np.bool_]:
             amps, _, _ = self.currents(self.esc.duty(pulse), omega, voc, warm)
-            return (omega == 0.0) | (self.motor.k(warm) * (amps - self.motor.no_load_A) >= wanted)
+            return np.asarray((omega == 0.0) | (self.motor.k(warm) * (amps - self.motor.no_load_A) >= wanted))
 
         ends = (np.full(soc.shape, end) for end in (self.esc.pulse_min_us, self.esc.pulse_max_us))
         return np.where(reached, _least(holds, *ends), np.nan)
 
 
-def _least(holds: Callable[[Array], Array], lo: Array, hi: Array) -> Array:
+def _least(holds: Callable[[Array], NDArray[np.bool_]], lo: Array, hi: Array) -> Array:
     """Least value from (N,) lo to hi at which something holds that goes on holding above and holds at hi."""
     row = np.arange(lo.size)
     for _ in range(6):  # 40 parts at a time
