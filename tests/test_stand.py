@@ -63,6 +63,12 @@ def simulated(request: pytest.FixtureRequest, key: Path) -> Iterator[hand.Simula
     found.close()
 
 
+@pytest.fixture
+def unplanned(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a recording can show, which takes most of the time before a run, is not asked for."""
+    monkeypatch.setattr(session._Log, "planned", lambda *_: None)
+
+
 def _stopped_after(stand: hand.Simulated, since: float) -> float:
     """Seconds until the output was at its stop value."""
     until = time.monotonic() + 5.0
@@ -240,7 +246,7 @@ def test_a_bad_line_says_what_is_wrong(line: str, said: str) -> None:
 
 
 def test_a_stand_that_does_not_answer_is_said_and_nothing_is_left(
-    project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    project: Path, tmp_path: Path, unplanned: None, capsys: pytest.CaptureFixture[str]
 ) -> None:
     case = str(project / "cases" / "prop_8x5")
     limits = ["--largest-us", "1500", "--ramp-us-s", "200", "--current-A", "20", "--temperature-C", "20",
@@ -276,7 +282,7 @@ def test_a_sitting_tells_its_story_in_one_folder(project: Path, tmp_path: Path) 
 
 
 def test_a_real_stand_asks_before_each_run_and_for_the_weather_once(
-    project: Path, key: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    project: Path, key: Path, tmp_path: Path, unplanned: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Behind the wire of RCbenchmark is a simulated one, and the sitting does not know."""
     asked: list[str] = []
