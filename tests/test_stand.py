@@ -282,7 +282,7 @@ def test_a_sitting_tells_its_story_in_one_folder(project: Path, tmp_path: Path) 
 
 
 def test_a_real_stand_asks_before_each_run_and_for_the_weather_once(
-    project: Path, key: Path, tmp_path: Path, unplanned: None, monkeypatch: pytest.MonkeyPatch
+    project: Path, key: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Behind the wire of RCbenchmark is a simulated one, and the sitting does not know."""
     asked: list[str] = []
