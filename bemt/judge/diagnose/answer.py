@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -205,13 +205,18 @@ class Diagnosis:
     # (M,) Readings as the improved model gives them: fitted, and each block from the others [units of the readings]
     after: Array
     held: Array
-    next: suggestion.Suggestion  # What would decide
+    settling: Callable[[], suggestion.Suggestion]  # Finds what would decide
     alike: form.Confusion  # Distances of effects in this plan
     absent: dict[str, str]  # Effects that could not be tried, and why
     # Of the motor's speed over pulse width, a problem of its own; None where it was not recorded
     drive: Diagnosis | None = None
     loads: Diagnosis | None = None  # Of thrust and torque, where they name nothing and the answer is that of the drive
     change: RunChange | None = None  # Change from the references, where there is one recording beside them
+
+    @property
+    def next(self) -> suggestion.Suggestion:
+        """What would decide; found when it is asked for, as a run is planned by many solutions."""
+        return self.settling()
 
     @property
     def readings(self) -> Readings:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -124,11 +125,15 @@ def _diagnose(
     after = problem.centre + best.signature + smooth
     # without a verdict the likeliest explanation still says best which part of the mismatch is not calibration
     where = locate(found, best if best.ids or not found.spans else fitting.fit(found, _solved(found)))
-    say("next measurement")
-    step = _next(found, decision, best, given)
+
+    @cache
+    def settling() -> suggestion.Suggestion:
+        with posterior.one_thread():
+            return _next(found, decision, best, given)
+
     return Diagnosis(
         found, decision, decision, best, parameters, found.p_value, where, _scores(found, after, held, gp_only), words,
-        after, held, step, form.confusion(found), absent, None, None, change,
+        after, held, settling, form.confusion(found), absent, None, None, change,
     )  # fmt: skip
 
 

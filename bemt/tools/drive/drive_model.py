@@ -345,15 +345,31 @@ class Drive:
 
     def pulses_for(self, thrust_N: float, soc: Array, temperature_C: float | None = None) -> Array:
         """Pulse widths that give a thrust at (N,) states of charge, NaN where none does. [us]"""
-        lo, hi = np.full(soc.shape, self.esc.pulse_min_us), np.full(soc.shape, self.esc.pulse_max_us)
-        out_of_reach, row = np.zeros(soc.shape, dtype=bool), np.arange(soc.size)
-        for _ in range(6):  # thrust rises with pulse width: 40 parts at a time
-            grid = np.linspace(lo, hi, 41, axis=-1)
-            enough = self.steady(grid, soc[:, None], temperature_C).thrust_N >= thrust_N
-            out_of_reach |= ~enough[:, -1]
-            i = np.argmax(enough, axis=1)
-            lo, hi = grid[row, np.maximum(i - 1, 0)], grid[row, i]
-        return np.where(out_of_reach, np.nan, hi)
+        full = self.steady(self.esc.pulse_max_us, soc, temperature_C)
+        reached = full.thrust_N >= thrust_N
+        top = np.where(reached, full.rpm * math.pi / 30.0, 0.0)
+        omega = _least(lambda w: np.asarray(self.rotor.thrust(w) >= thrust_N), np.zeros(soc.shape), top)[:, None]
+        warm = np.asarray(self.motor.ambient_C if temperature_C is None else temperature_C, dtype=float)
+        voc, wanted = self.battery.voc(soc)[:, None], self.rotor.torque(omega)
+
+        def holds(pulse: Array) -> NDArray[np.bool_]:
+            amps, _, _ = self.currents(self.esc.duty(pulse), omega, voc, warm)
+            return np.asarray((omega == 0.0) | (self.motor.k(warm) * (amps - self.motor.no_load_A) >= wanted))
+
+        ends = (np.full(soc.shape, end) for end in (self.esc.pulse_min_us, self.esc.pulse_max_us))
+        return np.where(reached, _least(holds, *ends), np.nan)
+
+
+def _least(holds: Callable[[Array], NDArray[np.bool_]], lo: Array, hi: Array) -> Array:
+    """Least value from (N,) lo to hi at which something holds that goes on holding above and holds at hi."""
+    row = np.arange(lo.size)
+    for _ in range(6):  # 40 parts at a time
+        grid = np.linspace(lo, hi, 41, axis=-1)
+        held = holds(grid)
+        held[:, -1] = True
+        i = np.argmax(held, axis=1)
+        lo, hi = grid[row, np.maximum(i - 1, 0)], grid[row, i]
+    return hi
 
 
 # The drive of a case: its battery, ESC and motor around its rotor, with whatever a label leaves open filled in.
