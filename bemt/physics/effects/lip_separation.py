@@ -94,7 +94,7 @@ class LipSeparation(Effect):
 
     def odds(self) -> float:
         """Each measure is as likely as the others, however many of its settings are tried."""
-        return 1.0 / sum(v["by"] == self.by for v in _variants())
+        return 1.0 / _tried(self.by)
 
     def variants(self) -> tuple[dict[str, str | float], ...]:
         """Onsets and losses, at once and bit by bit: by the load, with hysteresis too, by V/w, by turning."""
@@ -117,3 +117,8 @@ def _variants() -> tuple[dict[str, str | float], ...]:
         for o in (0.01, *onsets) for k in losses for w in (0.0, 1.0, 3.0)
     )  # fmt: skip
     return by_load + by_advance + by_turning
+
+
+@cache
+def _tried(by: str) -> int:
+    return sum(v["by"] == by for v in _variants())
