@@ -169,6 +169,20 @@ def test_electrical_power_for_torque_claims_nothing_unlisted(tmp_path: Path, vol
     assert answer.verdict in verdicts
 
 
+def test_watts_of_one_motor_share_its_losses_in_both_runs(tmp_path: Path) -> None:
+    """Thrust alone moved, at the same watts: they stand for the torque well enough to leave the air out."""
+    files = []
+    for name, seed, gain in (("a.csv", 1, 1.0), ("b.csv", 2, 0.85)):
+        table = stand(seed, scaled(thrust_N=gain))
+        efficiency = 0.85 - 0.5 * np.exp(-table["rpm"] / 3000.0)
+        table["electrical_power_W"] = table.pop("torque_Nm") * table["rpm"] * np.pi / 30.0 / efficiency
+        files.append(written(tmp_path / name, table | {"voltage_V": np.full(17, 12.0)}))
+    answer = compare(*files)
+    assert "thrust_gain" in answer.effects and "air_density" not in answer.effects
+    watts = answer.document["ratios"]["electrical_power_W"]
+    assert watts["low95"] < 1.0 < watts["high95"] < 1.15 * watts["low95"]
+
+
 def test_recorded_density_is_the_cause_when_the_coefficients_agree(tmp_path: Path) -> None:
     a, b = stand(1), stand(2, scaled(thrust_N=1.1, torque_Nm=1.1))
     files = [

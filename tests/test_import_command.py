@@ -324,6 +324,8 @@ def test_watts_beside_volts_are_what_the_supply_gave(tmp_path: Path, heading: st
     metered = [(*row, row[3] / row[2] * k) for row, k in zip(rows, (1.03, 0.96, 1.0, 1.02), strict=True)]
     file.write_text(f"rpm,thrust_N,volts,{heading},amps\n" + "".join(f"{','.join(map(str, r))}\n" for r in metered))
     assert named(import_file(file))["electrical_power_W"].tolist() == [12, 26, 48, 80]
+    file.write_text("rpm,thrust_N,Watt\n" + "".join(f"{n},{T},{P}\n" for n, T, _, P in rows))
+    assert named(import_file(file))["electrical_power_W"].tolist() == [12, 26, 48, 80]  # what an instrument shows
     file.write_text(f"rpm,torque_Nm,volts,{heading}\n" + "".join(f"{','.join(map(str, r))}\n" for r in rows))
     assert "electrical_power_W" not in named(import_file(file))
 

@@ -37,7 +37,6 @@ DAYS = (
 )
 """What tells two runs apart whose loads differ by a share."""
 SCHEMA = "bemt.comparison/1"
-_TORQUES = {"torque_Nm", "power_W", "CP", "CQ"}
 # Density is asked for unless it is this many times less likely than the likeliest cause.
 _FIRST = 5.0
 # Change of a load that days of one site can make, and from which on it is worth a thermometer, in ln.
@@ -91,7 +90,7 @@ def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
     density = likely.get("air_density", 0.0) * _FIRST >= max(likely.values(), default=1.0)
     if density and loads and days:
         return {"text": DAYS, "command": asked.with_days()}
-    if not _TORQUES & change.ratios.keys() and change.loads is said:
+    if "torque" not in change.loads_by_name and change.loads is said:
         text = "record torque in both runs: thrust alone cannot tell gain, air and blade apart"
         return {"text": text, "command": asked.command(a="A_WITH_TORQUE.csv", b="B_WITH_TORQUE.csv")}
     again = asked.command(b="A_AGAIN.csv", rows_b=asked.rows_a, air_b=asked.air_a)

@@ -18,7 +18,7 @@ from bemt.base.arrays import Array
 from bemt.base.gaussian.evidence import LinearTerms, log_sum, shares
 from bemt.base.gaussian.whitening import log_density, whitener
 from bemt.judge.compare import smooth_change as fits
-from bemt.judge.compare.matched import MatchedChannel
+from bemt.judge.compare.matched import FOLLOWS_LOAD, MatchedChannel
 from bemt.judge.compare.smooth_change import Scatter
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation, Sizes
 from bemt.judge.loss import Decision, decide
@@ -35,7 +35,7 @@ SUPPLY = Explanation.of("battery_sag")
 _BY_VOLTS = {"speed": (0.85, 0.15), "electrical": (0.0, 0.5)}
 TOLD_VOLTAGE = 0.03
 """Voltages of battery or supply that were read apart by more than this at equal command are a cause, ln [1]."""
-BY_LOAD = {"speed": (-0.13, 0.09), "electrical": (1.0, 0.25)}
+BY_LOAD = {"speed": (-0.13, 0.09), "electrical": (1.0, FOLLOWS_LOAD)}
 """How speed at one command and power at one speed follow the torque, as powers with their standard deviations: at
 voltage V and a drop I R of 5 to 40 % of the rest dn/n = -c/(1 + 2 c) dQ/Q with c = I R/(V - I R); losses go with the
 square of the torque (declared)."""

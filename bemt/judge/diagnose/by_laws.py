@@ -14,14 +14,13 @@ from bemt.judge import loss
 from bemt.judge.compare import recordings
 from bemt.judge.compare.drive_laws import Judgement
 from bemt.judge.compare.matched import (
-    BY_POWER,
-    EFFICIENCY,
     LOADS,
     MARGIN,
     SESSION,
     density_change,
     like_voltage,
     log_range,
+    losses_differ,
 )
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import knowledge, posterior, signatures
@@ -118,7 +117,7 @@ def weighed(
     pair: RunChange, only: Collection[str] | None = None, gone: Collection[str] = ()
 ) -> posterior.Evidence | None:  # fmt: skip
     """Explanations of what changed from A to B, weighed; None where nothing can be."""
-    both = records_of(pair.a, pair.b, pair.diameter_m, pair.rotor.likelier)
+    both = records_of(pair)
     if both is None:
         return None
     known, test = both
@@ -156,13 +155,9 @@ def _as_counted(candidate: Candidate, pair: RunChange) -> Candidate | None:
     return candidate.only(np.array([fits(s) for s in candidate.settings]))
 
 
-def records_of(
-    a: StandRun, b: StandRun, diameter_m: float, scatter: Mapping[str, Scatter]
-) -> tuple[Record, Record] | None:  # fmt: skip
-    """Both recordings with the same channels, A as reference, in the air that both tell.
-
-    ``scatter`` of single readings as both recordings show it, by thrust and torque.
-    """
+def records_of(pair: RunChange) -> tuple[Record, Record] | None:
+    """Both recordings with the same channels, A as reference, in the air that both tell."""
+    a, b, diameter_m = pair.a, pair.b, pair.diameter_m
     channels = _channels_of(a, b)
     if not channels:
         return None
@@ -172,8 +167,10 @@ def records_of(
     D = diameter_m if math.isfinite(diameter_m) else _D
     # what lags on the way up and down in one of them may be a zero of the other
     shift = {c: max(r.shift.get(c, 0.0) for r in (a, b)) for c in channels.values()}
+    power = pair.ratios.get("electrical_power_W")
+    losses = float(losses_differ(math.log(power.ratio) if power else 0.0))
     out = [
-        _record(r, channels, D, rho, max(apart), reference, scatter, shift)
+        _record(r, channels, D, rho, max(apart), reference, pair.rotor.likelier, shift, losses)
         for r, rho, reference in ((a, 1.0, True), (b, math.exp(log_ratio), False))
     ]
     known, test = out
@@ -207,7 +204,7 @@ def _in_reach(test: Record, known: Record) -> Record:
 
 def _record(
     run: StandRun, channels: dict[str, str], D: float, density: float, repeatability: float, reference: bool,
-    scatter: Mapping[str, Scatter], shift: Mapping[str, float],
+    scatter: Mapping[str, Scatter], shift: Mapping[str, float], losses: float,
 ) -> Record | None:  # fmt: skip
     points = run.points
     usual = {"rpm": _RPM, "density_kg_m3": np.nan, "airspeed_m_s": 0.0}
@@ -224,7 +221,7 @@ def _record(
     measured = {k: np.asarray(points[c] * unit[c], dtype=float) for k, c in channels.items()}
     if "torque_Nm" in measured:  # its sign is the sense of rotation
         measured["torque_Nm"] *= np.sign(np.nansum(measured["torque_Nm"])) or 1.0
-    u, zero = _errors({c: (k, measured[k], unit[c]) for k, c in channels.items()}, points, scatter, shift)
+    u, zero = _errors({c: (k, measured[k], unit[c]) for k, c in channels.items()}, points, scatter, shift, losses)
     good = np.isfinite(rpm) & (rpm > 0.0) & np.isfinite(rho)
     good &= np.any([np.isfinite(v) for v in measured.values()], axis=0)
     good &= rpm > _STARTED * float(np.max(rpm, where=good, initial=0.0))
@@ -256,7 +253,7 @@ def _record(
 
 def _errors(
     readings: Mapping[str, tuple[str, Array, Array | float]], points: Dataset, scatter: Mapping[str, Scatter],
-    shift: Mapping[str, float],
+    shift: Mapping[str, float], losses: float,
 ) -> tuple[dict[str, Array], dict[str, float]]:  # fmt: skip
     """Standard uncertainties of loads, and of their zeros; ``readings`` by channel with their unit."""
     u, zero = {}, {}
@@ -267,7 +264,7 @@ def _errors(
         if shift[c]:
             zero[k] = shift[c] * full
         if c == "electrical_power_W":  # a motor takes power without any load
-            u[k], zero[k] = np.hypot(u[k], EFFICIENCY * y), max(zero.get(k, 0.0), BY_POWER * full)
+            u[k], zero[k] = np.hypot(u[k], losses * y), max(zero.get(k, 0.0), SESSION["electrical"] * full)
     return u, zero
 
 
