@@ -284,6 +284,26 @@ def test_a_wrong_pole_count_moves_the_points_along_the_speed(tmp_path: Path) -> 
     assert row["parameters"]["factor"]["value"] == pytest.approx(1.0 / 6.0, rel=0.01)
 
 
+@pytest.mark.parametrize("driven", [True, False])
+def test_pole_pairs_that_are_the_next_winding_are_named_by_their_ratio(tmp_path: Path, driven: bool) -> None:
+    """Seven entered as six: the loads fall by (6/7)^2, and at equal command the speed that is read rises by 7/6."""
+    files = []
+    for name, seed, read in (("a.csv", 23, 1.0), ("b.csv", 24, 7.0 / 6.0)):
+        table = stand(seed)
+        if driven:
+            table["throttle"] = table["rpm"] / 8000.0
+            table |= {
+                "voltage_V": np.full(17, 12.0),
+                "electrical_power_W": 1.4 * table["torque_Nm"] * table["rpm"] / 9.55,
+            }
+        files.append(written(tmp_path / name, table | {"rpm": read * table["rpm"]}))
+    answer = compare(*files)
+    assert "counter set to 6 instead of 7 pole pairs" in " ".join(answer.text.split())
+    assert next(iter(answer.document["subsystems"]["drive"]["ranking"]), {"effect": "none"})["effect"] == "none"
+    if driven:
+        assert answer.effects[0] == "rpm_scale" and "no change beyond scatter" not in answer.text
+
+
 def test_stairs_of_few_steps_are_no_ramp(tmp_path: Path) -> None:
     """A lag was allowed for, which took a third of a change that every step shows."""
     rng = np.random.default_rng(5)

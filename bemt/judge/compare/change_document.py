@@ -6,6 +6,7 @@ import math
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import field
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 from bemt import __version__
 from bemt.base.document import Documented
 from bemt.base.tables import number_text, or_null, text_table
+from bemt.base.unit_errors import SpeedRatio, speed_ratios
 from bemt.judge.compare.drive_laws import FAMILY, Judgement, law
 from bemt.judge.compare.matched import LOADS
 from bemt.judge.compare.recordings import (
@@ -348,11 +350,18 @@ def _said(doc: ComparedRuns) -> list[str]:
     told = (doc.told or ()) if doc.diagnosis else (sentence(doc),)
     said_below = ("Next: ", "bemt ", "if ")
     out += [t for t in told if not (step.get("text") and t.lstrip().startswith(said_below))]
+    if not doc.diagnosis and "rpm_scale" in (*doc.effects, *_likely(doc)):
+        out += [
+            f"A miscount of {m.true}/{m.set} fits: in B, {m.words}; or the inverse in A." for m in _miscounts(doc)[:1]
+        ]
     drive = doc.subsystems.get("drive")
     if drive and drive.effects and drive.effects != doc.effects:
         out.append(f"Drive: {drive.verdict}: {', '.join(title_of(k) for k in drive.effects)}.")
     elif drive and doc.verdict != "none" and drive.verdict == "none":
-        out.append("Drive: no change beyond scatter.")
+        moved = [r for r in doc.ratios.values() if r.over_command and not r.low95 < 1.0 < r.high95]
+        out.append(
+            f"Drive: no change beyond {'what load, voltage and count of the speed make' if moved else 'scatter'}."
+        )
     if step.get("text"):
         out.append(f"Next: {step['text']}.")
     out = [textwrap.fill(line, 110, initial_indent="  ", subsequent_indent="    ") for line in out]
@@ -360,6 +369,13 @@ def _said(doc: ComparedRuns) -> list[str]:
         out += [f"    {t.strip()}" for t in told if t.lstrip().startswith("if ")]
         out.append(f"    {step['command']}")
     return out
+
+
+def _miscounts(doc: ComparedRuns) -> list[SpeedRatio]:
+    """Miscounts of the speed that move the loads as they moved, the commonest first."""
+    r = next((r for r in doc.ratios.values() if r.kind == "thrust"), None)
+    ends = (r.high95**-0.5, r.low95**-0.5) if r else (math.inf, 0.0)
+    return [m for m in speed_ratios(nearest=Fraction(8, 7)) if ends[0] < m.ratio < ends[1]]
 
 
 def _of_loads(loads: Mapping[str, Ratio]) -> list[str]:

@@ -15,8 +15,16 @@ import numpy as np
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.judge.compare import smooth_change as fits
-from bemt.judge.compare.drive_laws import SUPPLY, TOLD_VOLTAGE, Judgement, Load, judge_drive, weigh
-from bemt.judge.compare.matched import DRIVE, LOADS, MatchedChannel, StandRun, advance, density_change
+from bemt.judge.compare.drive_laws import (
+    SUPPLY,
+    TOLD_VOLTAGE,
+    Judgement,
+    Load,
+    judge_drive,
+    log_density_of_ratios,
+    weigh,
+)
+from bemt.judge.compare.matched import DRIVE, LOADS, POWER_OF_SPEED, MatchedChannel, StandRun, advance, density_change
 from bemt.judge.explanation import NONE, Size
 from bemt.judge.loss import SECOND, Decision, decide, joined, parts
 
@@ -74,7 +82,7 @@ class RunChange:
             return NO_VERDICT
         if _unloaded(self.a, self.b, self.diameter_m):
             return replace(NO_VERDICT, why="the advance ratios differ, and the drive follows the load")
-        P = weigh(self.behind.channels, (self.behind.free, self.behind.steady), self._load)
+        P = weigh(self.behind.channels, (self.behind.free, self.behind.steady), self._load(self._miscount))
         if not self._by_volts:
             return judge_drive(P)
         # known from the files: what is left is whether something else changed as well
@@ -92,16 +100,33 @@ class RunChange:
         return change if "speed" in self.behind.channels and abs(change) >= TOLD_VOLTAGE else 0.0
 
     @property
-    def _load(self) -> Load:
+    def _miscount(self) -> float:
+        """What the speed of B reads over what it is, natural logarithm, if the loads say so."""
+        said = self.loads.parameters.get("rpm_scale")
+        return math.log(said["factor"].value * (1.0 + said["eps"].value)) if said else 0.0
+
+    def told_by_drive(self, miscount: float) -> float:
+        """Log odds that speeds of B read exp(``miscount``) times what they are, as the drive takes them [1]."""
+        at = {r.kind: (math.log(r.ratio), math.log(r.high68 / r.low68) / 2.0) for r in self.ratios.values()}
+        drive = {k: at[k] for k in ("speed", "electrical") if k in at}
+        if "speed" not in drive:
+            return 0.0
+        volts = at["voltage"][0] if "voltage" in at else None
+        read, right = (log_density_of_ratios(drive, volts, self._load(x)) for x in (miscount, 0.0))
+        return read - right
+
+    def _load(self, miscount: float) -> Load:
         """How the load of the drive changed; where torque is not recorded, thrust tells it by half."""
         found = {r.kind: r for r in self.ratios.values() if r.kind in LOADS}
         r = found.get("torque", found.get("thrust"))
         if r is None:
-            return Load()
-        change, unsure = math.log(r.ratio), math.log(r.high68 / r.low68) / 2.0
-        along = np.log([point[2] for point in r.curve])
-        varies = float(np.max(np.abs(along - change)))
-        return Load(change, unsure if "torque" in found else math.hypot(unsure, _BY_THRUST * change), varies)
+            return Load(miscount=miscount)
+        unsure, along = math.log(r.high68 / r.low68) / 2.0, np.log([point[2] for point in r.curve])
+        varies = float(np.max(np.abs(along - math.log(r.ratio))))
+        channel = next(c for c, one in self.ratios.items() if one is r)
+        change = math.log(r.ratio) + POWER_OF_SPEED.get(channel, 2.0) * miscount
+        unsure = unsure if "torque" in found else math.hypot(unsure, _BY_THRUST * change)
+        return Load(change, miscount, unsure, varies)
 
     @property
     def density_ratio(self) -> float:

@@ -197,7 +197,8 @@ def _by_power(part: Part, losses: Array) -> Part:
     note = "torque: not recorded; electrical power stands for it, losses as in the reference"
     told = replace(
         record, measured={**record.measured, "torque_Nm": torque}, u={**record.u, "torque_Nm": u},
-        zero={**record.zero, "torque_Nm": SESSION["electrical"] * float(np.max(size))}, electrical=True, notes=(*record.notes, note),
+        zero={**record.zero, "torque_Nm": SESSION["electrical"] * float(np.max(size))}, electrical=True,
+        notes=(*record.notes, note),
     )  # fmt: skip
     return replace(part, record=told, _solved={})
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -43,8 +43,8 @@ if TYPE_CHECKING:
 
 MOST = 40
 """Points of a recording that are weighed; more are averaged with alike ones [1]."""
-# Speed at equal command of one motor, natural logarithm: battery and load change it by no more.
-_SAME_DRIVE = 0.06
+# Log odds below which nothing is counted.
+_SHUT = -60.0
 # Speed below this share of the largest: a rotor that has just set off.
 _STARTED = 0.15
 _COVARIATES = ("time_s", "temperature_K", "tip_gap_m", "wall_distance_m", "second_rotor_rad_s", "run")
@@ -134,25 +134,19 @@ def weighed(
 
 
 def _as_counted(candidate: Candidate, pair: RunChange) -> Candidate | None:
-    """Candidate without what the recordings rule out besides the loads; None where nothing is left.
+    """Candidate with the odds that the recordings tell besides the loads; None where they rule it out.
 
-    One motor at one command turns as fast as before, whatever is indicated. What two thermometers leave open of the
-    density counts as repeatability.
+    One motor at one command turns about as fast as before, whatever is indicated. What two thermometers leave open of
+    the density counts as repeatability.
     """
     if candidate.id == "air_density" and density_change(pair.a, pair.b)[1]:
         return None
-    r = next((r for r in pair.ratios.values() if r.kind == "speed"), None)
-    if r is None or candidate.id not in ("rpm_scale", "unit_slip"):
+    if candidate.id not in ("rpm_scale", "unit_slip"):
         return candidate
-
-    def fits(setting: Mapping[str, Any]) -> bool:
-        if setting.get("channel", "rpm") != "rpm":
-            return True
-        ratio = abs(setting["factor"]) * (1.0 + setting.get("eps", 0.0))
-        unsure = _SAME_DRIVE + math.log(r.high95 / r.ratio)
-        return abs(math.log(r.ratio / ratio)) < unsure
-
-    return candidate.only(np.array([fits(s) for s in candidate.settings]))
+    read = [abs(s["factor"]) * (1.0 + s.get("eps", 0.0)) if s.get("channel", "rpm") == "rpm" else 1.0
+            for s in candidate.settings]  # fmt: skip
+    told = np.array([max(pair.told_by_drive(math.log(x)), _SHUT) for x in read])
+    return replace(candidate, weight=candidate.weight * np.exp(told))
 
 
 def records_of(pair: RunChange) -> tuple[Record, Record] | None:
