@@ -183,6 +183,22 @@ def test_watts_of_one_motor_share_its_losses_in_both_runs(tmp_path: Path) -> Non
     assert watts["low95"] < 1.0 < watts["high95"] < 1.15 * watts["low95"]
 
 
+@pytest.mark.parametrize(("gain", "verdict"), [(1.0, "none"), (0.9, "insufficient")])
+def test_without_a_speed_thrust_is_compared_at_equal_watts(tmp_path: Path, gain: float, verdict: str) -> None:
+    """A kitchen scale and a wattmeter: another battery changes nothing at equal watts, and no cause can be told."""
+    files = []
+    for name, seed, factor, volts in (("a.csv", 1, 1.0, 12.0), ("b.csv", 2, gain, 10.5)):
+        table = stand(seed, scaled(thrust_N=factor))
+        watts = 1.4 * table.pop("torque_Nm") * table["rpm"] * np.pi / 30.0
+        throttle = 100.0 * table.pop("rpm") / 9000.0 * 12.0 / volts
+        files.append(written(tmp_path / name, table | {"Watt": watts, "Throttle (%)": throttle}))
+    answer = compare(*files)
+    thrust = answer.document["ratios"]["thrust_N"]
+    assert (answer.verdict, answer.effects) == (verdict, ())
+    assert thrust["kind"] == "at_power" and thrust["low95"] < gain < thrust["high95"] < 1.1 * thrust["low95"]
+    assert "at equal electrical power" in answer.text and answer.picture()
+
+
 def test_recorded_density_is_the_cause_when_the_coefficients_agree(tmp_path: Path) -> None:
     a, b = stand(1), stand(2, scaled(thrust_N=1.1, torque_Nm=1.1))
     files = [
@@ -716,7 +732,8 @@ def test_a_recording_without_a_speed_is_said_to_have_none(tmp_path: Path) -> Non
     del b["rpm"]
     with pytest.raises(InputError) as caught:
         compare(written(tmp_path / "a.csv", a), written(tmp_path / "b.csv", b))
-    assert [(Path(f.file).name, f.expected) for f in caught.value.faults] == [("b.csv", "a speed of rotation, or J")]
+    expected = "a speed of rotation, J, electrical power or a throttle in both"
+    assert [(Path(f.file).name, f.expected) for f in caught.value.faults] == [("b.csv", expected)]
 
 
 def panels(change: RunChange, monkeypatch: pytest.MonkeyPatch) -> list[Axes]:

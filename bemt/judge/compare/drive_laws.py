@@ -20,7 +20,7 @@ from bemt.base.gaussian.whitening import log_density, whitener
 from bemt.judge.compare import smooth_change as fits
 from bemt.judge.compare.matched import FOLLOWS_LOAD, POWER_OF_SPEED, MatchedChannel
 from bemt.judge.compare.smooth_change import Scatter
-from bemt.judge.explanation import NONE, UNKNOWN, Explanation, Sizes
+from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation, Sizes
 from bemt.judge.loss import Decision, decide
 from bemt.physics.effects.base import FORM
 
@@ -168,7 +168,7 @@ class Load:
     varies: float = 0.0  # Largest departure from the mean
 
 
-_READ = {"speed": 1.0, "electrical": -POWER_OF_SPEED["electrical_power_W"], "voltage": 0.0}
+_READ = {"speed": 1.0, "electrical": -POWER_OF_SPEED["electrical_power_W"]}
 """Power of what a speed reads over what it is, with which a channel of the drive goes."""
 
 
@@ -176,8 +176,8 @@ def log_density_of_ratios(ratios: Mapping[str, tuple[float, float]], volts: floa
     """Log density of ratios of the drive, whatever changed it: ``ratios`` and ``volts`` as ln and standard deviation.
 
     >>> read = {"speed": (0.154, 0.02), "electrical": (-0.462, 0.03)}  # 7/6 of a speed that did not change
-    >>> wrong, right = (log_density_of_ratios(read, 0.0, load) for load in (Load(0.0, 0.154, 0.02), Load(-0.31, 0.0, 0.02)))
-    >>> wrong > right + 3.0
+    >>> miscounted, turned = Load(0.0, 0.154, 0.02), Load(-0.31, 0.0, 0.02)
+    >>> log_density_of_ratios(read, 0.0, miscounted) > log_density_of_ratios(read, 0.0, turned) + 3.0
     True
     """
     names, v = list(ratios), volts or 0.0
@@ -204,7 +204,7 @@ def _followed(
         (by_volts, more_volts), (by_load, more_load) = _BY_VOLTS.get(name, (0.0, 0.0)), BY_LOAD.get(name, (0.0, 0.0))
         basis = _bases(c)
         b, v = basis["all"], np.broadcast_to(volts.get(name, 0.0), c.y.shape)
-        mean[name] = b * (by_volts * v + by_load * load.change + _READ[name] * load.miscount)
+        mean[name] = b * (by_volts * v + by_load * load.change + _READ.get(name, 0.0) * load.miscount)
         level = b * math.hypot(more_load * load.change, by_load * load.unsure)
         columns = np.column_stack([*(more_volts * v * basis[k] for k in ("all", "ramp", "bow")), level])
         # another load is another curve over the command
@@ -303,6 +303,15 @@ def _any_change(channels: Mapping[str, MatchedChannel], base: Mapping[str, Array
             total += log_density(base[name] + free, y) - log_density(base[name], y)
         found.append(total)
     return float(log_sum(found)) - math.log(len(found))
+
+
+def weigh_factor(c: MatchedChannel, s: Scatter) -> dict[Explanation, float]:
+    """Probability that a channel changed by one factor, or nearly so, by what nobody can tell: "doubt"; or not."""
+    y, C = c.y - c.y.mean(), fits.covariance(c, s)
+    found = [log_density(C + size**2 * fits.steady_change(c), y) for size, *_ in _UNKNOWN_KINDS]
+    none = math.log(PRIOR["none"]) + log_density(C, y)
+    changed = math.log((1.0 - PRIOR["none"]) / len(found)) + float(log_sum(found))
+    return dict(zip((NONE, DOUBT), shares([none, changed]).tolist(), strict=True))
 
 
 def judge_drive(P: Mapping[Explanation, float]) -> Judgement:

@@ -23,8 +23,18 @@ from bemt.judge.compare.drive_laws import (
     judge_drive,
     log_density_of_ratios,
     weigh,
+    weigh_factor,
 )
-from bemt.judge.compare.matched import DRIVE, LOADS, POWER_OF_SPEED, MatchedChannel, StandRun, advance, density_change
+from bemt.judge.compare.matched import (
+    DRIVE,
+    LOADS,
+    POWER_OF_SPEED,
+    WITHOUT_SPEED,
+    MatchedChannel,
+    StandRun,
+    advance,
+    density_change,
+)
 from bemt.judge.explanation import NONE, Size
 from bemt.judge.loss import SECOND, Decision, decide, joined, parts
 
@@ -51,6 +61,8 @@ NOTHING_SHARED = "the two runs have no common speed and advance ratio"
 """Reason where every ratio would be one of two extrapolations."""
 IN_WIND = "as in wind, and no airspeed is recorded"
 """End of the reason where one recording shows a wind that it does not state."""
+NO_SPEED = "without the speed rotor, motor and scale look alike"
+"""Reason where thrust was compared at equal power or command."""
 OTHER_STAND = "no change on one stand moves every load by this much: check units and speeds of both files"
 
 
@@ -73,7 +85,12 @@ class RunChange:
     @cached_property
     def loads(self) -> Judgement:
         """Verdict on what acts on the rotor, worked out when it is asked for."""
-        return self.judge(self) if self.loads_by_name else NO_VERDICT
+        if not self.without_speed:
+            return self.judge(self) if self.loads_by_name else NO_VERDICT
+        ((name, c),) = self.rotor.channels.items()
+        P = weigh_factor(c, self.rotor.likelier[name])
+        said = decide(P)
+        return Judgement.of(replace(said, why=NO_SPEED) if said.by == "files" else said, P)
 
     @cached_property
     def drive(self) -> Judgement:
@@ -133,6 +150,11 @@ class RunChange:
         """Recorded density of B over that of A, by thermometers alone if need be; NaN unless both tell."""
         log_ratio, unsure = density_change(self.a, self.b)
         return math.exp(log_ratio) if unsure else self.b.density / self.a.density
+
+    @property
+    def without_speed(self) -> str:
+        """What thrust is compared at, in words, where no speed is recorded; else ""."""
+        return next((words for name, words in WITHOUT_SPEED.items() if name in self.channels), "")
 
     @property
     def loads_by_name(self) -> dict[str, MatchedChannel]:
@@ -220,12 +242,15 @@ def changed(
     rotor = fits.prepared(a, b, tuple(LOADS), diameter)
     used = {c.channel for c in rotor.channels.values()}
     behind = fits.prepared(a, b, [k for k, names in DRIVE.items() if not used & set(names)], diameter)
+    for name in WITHOUT_SPEED:
+        if not rotor.channels and not behind.channels:
+            rotor = fits.prepared(a, b, (name,), diameter)
     channels = {**rotor.channels, **behind.channels}
     if not channels:
         silent = [r for r in (a, b) if not {"rpm", "J"} & r.points.values.keys()]
         if silent:
-            hint = "Head the column rpm; nothing can be compared but at equal speed"
-            expected = "a speed of rotation, or J"
+            hint = "Head the column rpm, or record watts: thrust is compared at equal speed, power or throttle"
+            expected = "a speed of rotation, J, electrical power or a throttle in both"
             raise InputError([Fault(r.points.name, "", _told(r), expected, hint) for r in silent])
         got = f"{_told(a)} in A, {_told(b)} in B"
         raise InputError(
@@ -281,6 +306,10 @@ def _assumed(a: StandRun, b: StandRun, diameter: float, loads: Mapping[str, Matc
          "torque is not recorded in both: thrust alone cannot tell gain, air and blade apart"),
         ("electrical_power_W" in names,
          "torque is not recorded: electrical power replaces it, assuming the same motor and controller in both"),
+        ("at_power" in loads,
+         "speed is not recorded in both: electrical power replaces it, of one motor and controller"),
+        ("at_command" in loads,
+         "speed is not recorded in both: the command replaces it, of one motor and controller at one voltage"),
         (no_diameter and any(c.advance_moves() for c in loads.values()),
          "no diameter: compared at equal advance per turn, V/n; --label 10x5 gives J"),
     )  # fmt: skip
