@@ -125,7 +125,7 @@ class RunChange:
     def told_by_drive(self, miscount: float) -> float:
         """Log odds that speeds of B read exp(``miscount``) times what they are, as the drive takes them [1]."""
         at = {r.kind: (math.log(r.ratio), math.log(r.high68 / r.low68) / 2.0) for r in self.ratios.values()}
-        drive = {k: at[k] for k in ("speed", "electrical") if k in at}
+        drive: dict[str, tuple[float, float]] = {k: at[k] for k in ("speed", "electrical") if k in at}
         if "speed" not in drive:
             return 0.0
         volts = at["voltage"][0] if "voltage" in at else None
