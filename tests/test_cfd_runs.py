@@ -318,6 +318,18 @@ def test_zones_that_count_are_asked_for(put: Callable[..., Path]) -> None:
         run_of(["thrust.out"], {"rpm": RPM, "zones": ("blade", "hub")}, **UNITS)
 
 
+@pytest.mark.parametrize(("other", "duct"), [("shroud", 0.2), ("nacelle", 0.3)])
+def test_a_nacelle_is_the_duct_only_where_no_other_zone_is(put: Callable[..., Path], other: str, duct: float) -> None:
+    names = ("blade", other, "nacelle") if other != "nacelle" else ("blade", "nacelle")
+    head = "".join(rfile("thrust(blade)", steady(0.8 * T), None).splitlines(keepends=True)[:2])
+    shares = (0.7, 0.2, 0.1) if len(names) == 3 else (0.7, 0.3)
+    columns = " ".join(f'"thrust({z})"' for z in names)
+    rows = "".join(f"{k} " + " ".join(f"{s * T:.6g}" for s in shares) + "\n" for k in range(1, 200))
+    put("thrust.out", f'{head}("Iteration" {columns})\n{rows}')
+    run = run_of(["thrust.out"], {"rpm": RPM, "zones": names}, **UNITS)
+    assert (float(run["thrust_N"][0]), float(run["duct_thrust_N"][0])) == pytest.approx((T, duct * T), rel=1e-5)
+
+
 def test_the_start_up_is_cut_and_a_run_that_moves_says_so(put: Callable[..., Path]) -> None:
     k = np.arange(1.0, 301.0)
     put("thrust.out", rfile("thrust", T * (1.0 + 0.001 * k), None))

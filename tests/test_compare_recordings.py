@@ -169,6 +169,36 @@ def test_electrical_power_for_torque_claims_nothing_unlisted(tmp_path: Path, vol
     assert answer.verdict in verdicts
 
 
+def test_watts_of_one_motor_share_its_losses_in_both_runs(tmp_path: Path) -> None:
+    """Thrust alone moved, at the same watts: they stand for the torque well enough to leave the air out."""
+    files = []
+    for name, seed, gain in (("a.csv", 1, 1.0), ("b.csv", 2, 0.85)):
+        table = stand(seed, scaled(thrust_N=gain))
+        efficiency = 0.85 - 0.5 * np.exp(-table["rpm"] / 3000.0)
+        table["electrical_power_W"] = table.pop("torque_Nm") * table["rpm"] * np.pi / 30.0 / efficiency
+        files.append(written(tmp_path / name, table | {"voltage_V": np.full(17, 12.0)}))
+    answer = compare(*files)
+    assert "thrust_gain" in answer.effects and "air_density" not in answer.effects
+    watts = answer.document["ratios"]["electrical_power_W"]
+    assert watts["low95"] < 1.0 < watts["high95"] < 1.15 * watts["low95"]
+
+
+@pytest.mark.parametrize(("gain", "verdict"), [(1.0, "none"), (0.9, "insufficient")])
+def test_without_a_speed_thrust_is_compared_at_equal_watts(tmp_path: Path, gain: float, verdict: str) -> None:
+    """A kitchen scale and a wattmeter: another battery changes nothing at equal watts, and no cause can be told."""
+    files = []
+    for name, seed, factor, volts in (("a.csv", 1, 1.0, 12.0), ("b.csv", 2, gain, 10.5)):
+        table = stand(seed, scaled(thrust_N=factor))
+        watts = 1.4 * table.pop("torque_Nm") * table["rpm"] * np.pi / 30.0
+        throttle = 100.0 * table.pop("rpm") / 9000.0 * 12.0 / volts
+        files.append(written(tmp_path / name, table | {"Watt": watts, "Throttle (%)": throttle}))
+    answer = compare(*files)
+    thrust = answer.document["ratios"]["thrust_N"]
+    assert (answer.verdict, answer.effects) == (verdict, ())
+    assert thrust["kind"] == "at_power" and thrust["low95"] < gain < thrust["high95"] < 1.1 * thrust["low95"]
+    assert "at equal electrical power" in answer.text and answer.picture()
+
+
 def test_recorded_density_is_the_cause_when_the_coefficients_agree(tmp_path: Path) -> None:
     a, b = stand(1), stand(2, scaled(thrust_N=1.1, torque_Nm=1.1))
     files = [
@@ -268,6 +298,26 @@ def test_a_wrong_pole_count_moves_the_points_along_the_speed(tmp_path: Path) -> 
     assert "rpm_scale" in answer.effects and set(answer.effects) <= {"rpm_scale", "unit_slip"}
     row = next(r for r in answer.document["subsystems"]["loads"]["ranking"] if r["effect"] == "rpm_scale")
     assert row["parameters"]["factor"]["value"] == pytest.approx(1.0 / 6.0, rel=0.01)
+
+
+@pytest.mark.parametrize("driven", [True, False])
+def test_pole_pairs_that_are_the_next_winding_are_named_by_their_ratio(tmp_path: Path, driven: bool) -> None:
+    """Seven entered as six: the loads fall by (6/7)^2, and at equal command the speed that is read rises by 7/6."""
+    files = []
+    for name, seed, read in (("a.csv", 23, 1.0), ("b.csv", 24, 7.0 / 6.0)):
+        table = stand(seed)
+        if driven:
+            table["throttle"] = table["rpm"] / 8000.0
+            table |= {
+                "voltage_V": np.full(17, 12.0),
+                "electrical_power_W": 1.4 * table["torque_Nm"] * table["rpm"] / 9.55,
+            }
+        files.append(written(tmp_path / name, table | {"rpm": read * table["rpm"]}))
+    answer = compare(*files)
+    assert "counter set to 6 instead of 7 pole pairs" in " ".join(answer.text.split())
+    assert next(iter(answer.document["subsystems"]["drive"]["ranking"]), {"effect": "none"})["effect"] == "none"
+    if driven:
+        assert answer.effects[0] == "rpm_scale" and "no change beyond scatter" not in answer.text
 
 
 def test_stairs_of_few_steps_are_no_ramp(tmp_path: Path) -> None:
@@ -681,7 +731,8 @@ def test_a_recording_without_a_speed_is_said_to_have_none(tmp_path: Path) -> Non
     del b["rpm"]
     with pytest.raises(InputError) as caught:
         compare(written(tmp_path / "a.csv", a), written(tmp_path / "b.csv", b))
-    assert [(Path(f.file).name, f.expected) for f in caught.value.faults] == [("b.csv", "a speed of rotation, or J")]
+    expected = "a speed of rotation, J, electrical power or a throttle in both"
+    assert [(Path(f.file).name, f.expected) for f in caught.value.faults] == [("b.csv", expected)]
 
 
 def panels(change: RunChange, monkeypatch: pytest.MonkeyPatch) -> list[Axes]:

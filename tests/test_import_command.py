@@ -18,6 +18,7 @@ from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.data.recordings.adapt import Choice
 from bemt.data.recordings.channels import named
+from bemt.data.recordings.check import check
 from bemt.data.recordings.load import import_file, import_files
 
 PERIOD = 0.5
@@ -324,6 +325,8 @@ def test_watts_beside_volts_are_what_the_supply_gave(tmp_path: Path, heading: st
     metered = [(*row, row[3] / row[2] * k) for row, k in zip(rows, (1.03, 0.96, 1.0, 1.02), strict=True)]
     file.write_text(f"rpm,thrust_N,volts,{heading},amps\n" + "".join(f"{','.join(map(str, r))}\n" for r in metered))
     assert named(import_file(file))["electrical_power_W"].tolist() == [12, 26, 48, 80]
+    file.write_text("rpm,thrust_N,Watt\n" + "".join(f"{n},{T},{P}\n" for n, T, _, P in rows))
+    assert named(import_file(file))["electrical_power_W"].tolist() == [12, 26, 48, 80]  # what an instrument shows
     file.write_text(f"rpm,torque_Nm,volts,{heading}\n" + "".join(f"{','.join(map(str, r))}\n" for r in rows))
     assert "electrical_power_W" not in named(import_file(file))
 
@@ -360,3 +363,13 @@ def test_what_needs_no_action_has_a_mark_of_its_own(tmp_path: Path, capsys: pyte
     assert "--unit Thrust=UNIT" in step and "diagnose" not in step
     words = shlex.split(step.removeprefix("Next: bemt ").partition("   (")[0].replace("UNIT", "kgf"))
     assert main(words) == 0 and "thrust_N" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("heading", "found"), [("10K_Q", False), ("K_Q", True)])
+def test_a_torque_coefficient_ten_times_too_large_is_said(tmp_path: Path, heading: str, found: bool) -> None:
+    """As ships' propellers are tabled: 10 K_Q under the heading K_Q leaves a tenth of the merit that any rotor has."""
+    rows = [(0.0, 0.105, 0.065), (0.2, 0.09, 0.061), (0.4, 0.062, 0.05), (0.5, 0.044, 0.04)]
+    (tmp_path / "k.csv").write_text(f"J,K_T,{heading}\n" + "".join(f"{','.join(map(str, r))}\n" for r in rows))
+    said = {f.id: f for f in check(import_file(tmp_path / "k.csv"))}
+    assert ("coefficient_tenfold" in said) == found
+    assert not found or "multiply by 0.1" in said["coefficient_tenfold"].correction

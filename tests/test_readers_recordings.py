@@ -937,7 +937,8 @@ def test_a_point_at_which_the_vendors_code_failed_is_a_flagged_row(write: Write)
         ("Omega [rad s^-1]", "omega_rad_s", "rad_s"), ("ESC signal (Âµs)", "pulse_width_s", "s"),
         ("ESC throttle (μs)", "pulse_width_s", "s"), ("Throttle (us)", "pulse_width_s", "s"),
         ("Volts", "voltage_V", "V"),
-        ("Amps", "current_A", "A"), ("Watts", "P_W", "W"), ("Rotation speed (rpm)", "rpm", "rpm"), ("Ct", "CT", "-"),
+        ("Amps", "current_A", "A"), ("Watts", "P_W", "W"), ("Watt", "P_W", "W"), ("Ampere", "current_A", "A"),
+        ("Rotation speed (rpm)", "rpm", "rpm"), ("Ct", "CT", "-"),
         ("time_since_start_s", "time_s", "s"), ("Electrical Speed (eRPM)", "electrical_rpm", "rpm"),
         ("Vibration (m/s²)", "vibration_m_s2", "m/s2"),
         # ratios, rotors and ambiguous units stay what they are

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -591,8 +591,9 @@ def rotor_of(given: Propeller | Case | str | os.PathLike[str]) -> Propeller:
         raise InputError(Fault(text, "", "no folder or case of this name", f"a case, or a label: {size}"))
     try:
         return propeller(text)
-    except InputError:
-        if fresh.looks_like_label(text):
-            raise
+    except InputError as error:
         got, expected = "no folder or case of this name, and no label", "a case, its folder, or a label such as 10x5"
+        if fresh.looks_like_label(text):
+            unread = [replace(f, got=f"{got}: {f.got}") for f in error.faults]
+            raise InputError(unread) from None
         raise InputError(Fault(text, "", got, expected)) from None

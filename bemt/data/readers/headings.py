@@ -35,11 +35,8 @@ _OF_PROPELLER = re.compile(
 )
 """Coefficients as propellers and ships have them, K_T = CT and K_Q = CQ, but a motor's Kt has a unit; Cp may be that of
 a pressure: the table tells."""
-_ALONE = {  # a heading that is the name of a unit
-    "volts": ("voltage", "V"), "volt": ("voltage", "V"), "amps": ("current", "A"), "amp": ("current", "A"),
-    "amperes": ("current", "A"), "watts": ("P", "W"), "newtons": ("F", "N"),
-    "grams": ("F", "gf"), "gramm": ("F", "gf"), "ounces": ("F", "ozf"),
-}  # fmt: skip
+_ALONE = {"voltage": "voltage", "current": "current", "power": "P", "force": "F"}
+"""Name of a channel whose heading is the name of a unit, by the dimension of the unit."""
 USUAL: dict[str, str] = {
     "T_N": "thrust_N", "F_N": "thrust_N", "Q_Nm": "torque_Nm", "M_Nm": "torque_Nm", "U_V": "voltage_V",
     "I_A": "current_A", "pulse_width_s": "pwm_s", "V_m_s": "airspeed_m_s", "gap_m": "tip_gap_m",
@@ -301,6 +298,17 @@ def _as_stands_mean(text: str, base: str, stated: str) -> Heading | None:
     return None
 
 
+def unit_alone(text: str) -> units.Unit | None:
+    """Unit that a heading is the name of, as instruments show it; None: any other, and letters (``A`` is a rotor too).
+
+    >>> [unit.suffix if (unit := unit_alone(text)) else "" for text in ("Watt", "Grams", "Amps", "A", "Thrust", "rpm")]
+    ['W', 'gf', 'A', '', '', '']
+    """
+    found = unit_for("force", text.lower()) if text.lower() in WEIGHTS else unit_for("", text)
+    known = found is not None and found[0].dimension in _ALONE and len(text) > 2
+    return found[0] if found is not None and known else None
+
+
 @lru_cache(maxsize=4096)
 def channel_of(text: str, unit: str = "") -> str:
     """Usual name of the channel that a heading means, whatever wrote it: a bench, a CFD program.
@@ -376,8 +384,8 @@ def _by_suffix(core: str, text: str) -> tuple[str, units.Unit | None, str] | Non
 
 def _without_brackets(core: str, text: str) -> tuple[str, units.Unit | None, str]:
     """Name, unit and doubt of a heading that has no unit in brackets."""
-    if alone := _ALONE.get(core.lower()):
-        return alone[0], units.UNITS[alone[1]], ""
+    if unit := unit_alone(core):
+        return _ALONE[unit.dimension], unit, ""
     if (ending := _tail(core)) is not None:
         name, stated = ending
         return (name, stated, "") if isinstance(stated, units.Unit) else (name, None, stated)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bemt.base.arrays import Array
+from bemt.base.arrays import Array, middle
 from bemt.base.errors import Fault
 from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import QUANTITIES, RunColumn, RunToml
@@ -25,9 +25,9 @@ from bemt.data.recordings.cfd_setup import FLIES, Elsewhere
 from bemt.physics.dataset import Dataset
 
 _ALONG = 3.0  # a thrust stands out of the side forces by this factor, or the shaft is not along an axis
-DUCT = re.compile(r"duct|shroud|nozzle|nacelle|casing|housing|\bring\b|\blip\b|kort", re.IGNORECASE)
-"""Name of a zone that is the duct."""
-_STILL = re.compile(r"stator|vane|strut|pylon|support|leitrad|(?<![a-z])(ogv|igv|pod)(?![a-z])", re.IGNORECASE)
+DUCT = re.compile(r"duct|shroud|nozzle|casing|housing|\bring\b|\blip\b|kort", re.IGNORECASE)
+"""Name of a zone that is the duct; a nacelle is one where no other is, else a body on the axis."""
+_STILL = re.compile(r"stator|vane|nacelle|strut|pylon|support|leitrad|(?<![a-z])(ogv|igv|pod)(?![a-z])", re.IGNORECASE)
 _TURNS = re.compile(r"blade|rotor|prop|impeller|spinner|hub|nabe|(?<![a-z])fan(?![a-z])", re.IGNORECASE)
 """Names of zones that stand still, whatever else they say (``stator_blade``), and of those on the shaft."""
 _SLIGHT = 0.01
@@ -160,7 +160,10 @@ class OpenRun:
     def is_duct(self, zone: str) -> bool:
         """Whether a zone is the duct: as stated, else by its name."""
         stated = self.run.run.duct_zones
-        return zone in stated if stated is not None else bool(DUCT.search(zone))
+        if stated is not None:
+            return zone in stated
+        outer = not any(DUCT.search(c.zone) for c in self.columns)
+        return bool(DUCT.search(zone)) or (outer and "nacelle" in zone.lower())
 
     def fact(self, quantity: str) -> RunColumn:
         """What the user said of a quantity."""
@@ -254,12 +257,13 @@ class OpenRun:
         """
         V, rpm = (np.nan_to_num(state.get(k, np.zeros(1))) for k in ("airspeed_m_s", "rpm"))
         slowest, flies = float(V.min()), float(V.min()) > FLIES
-        middle = {q: _middle(f.values[V == slowest] if V.size == f.values.size else f.values) for q, f in loads.items()}
-        shaft = max((abs(middle[q]) * (1.0 if q == "power" else float(np.median(rpm)) * math.pi / 30.0)
+        at = {q: f.values[V == slowest] if V.size == f.values.size else f.values for q, f in loads.items()}
+        size = {q: float(np.nan_to_num(middle(v))) for q, v in at.items()}
+        shaft = max((abs(size[q]) * (1.0 if q == "power" else float(np.median(rpm)) * math.pi / 30.0)
                      for q in ("torque", "power") if q in loads), default=math.inf)  # fmt: skip
-        brakes = 0.0 < shaft < slowest * abs(middle.get("thrust", 0.0))  # no pull gives more than its shaft
+        brakes = 0.0 < shaft < slowest * abs(size.get("thrust", 0.0))  # no pull gives more than its shaft
         out: dict[str, float] = {}
-        for quantity, value in middle.items():
+        for quantity, value in size.items():
             told, name, sign = self.fact(quantity).sign, CHANNEL[quantity], -1.0 if value < 0 else 1.0
             if told is not None:
                 sign = float(told)
@@ -297,7 +301,7 @@ class OpenRun:
             got = f"loads of a program that took {taken:g} kg/m3, and no density of the run"
             self.fault(None, "density", got, "the density of the run", "--density-kg-m3 RHO: loads go with it")
             return np.ones(1)
-        self.notes.append(f"loads times {_middle(rho) / taken:.4g}: the program took a density of {taken:g} kg/m3")
+        self.notes.append(f"loads times {middle(rho) / taken:.4g}: the program took a density of {taken:g} kg/m3")
         return np.asarray(rho / taken)
 
     def mean(self, quantity: str, c: LoadColumn) -> Settled | None:
@@ -378,11 +382,6 @@ def _fits(c: LoadColumn, quantity: str) -> bool:
         return quantity in ("airspeed", "density") and quantity in meanings(word)
     name = channel_of(word.upper() if len(word) == 1 and word != "n" else word, unit.suffix)
     return {"P_W": "power_W"}.get(name, name) == _MEANT.get(quantity)  # CFD has no electrical power
-
-
-def _middle(values: Array) -> float:
-    """Median of what is finite; 0 of nothing."""
-    return float(np.nanmedian(values)) if np.isfinite(values).any() else 0.0
 
 
 def _level(c: LoadColumn) -> float:

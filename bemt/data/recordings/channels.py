@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from bemt.base import units
 from bemt.base.arrays import Array
 from bemt.base.tables import number_of
-from bemt.data.readers.headings import USUAL, counts_electrical
+from bemt.data.readers.headings import USUAL, counts_electrical, unit_alone
 from bemt.data.readers.recording import FULL_THROTTLE
 from bemt.physics.dataset import Dataset
 
@@ -152,7 +152,8 @@ def named(d: Dataset) -> Dataset:
     _command(values, names, notes)
     # a heading that says power, and not whose
     plain = names.get("power_W") == "power_W" and d.headings.get("power_W", "power_W") != "power_W"
-    _power(values, names, notes, values.get("power_W") if plain else d.values.get("P_W"))
+    bare = values.get("power_W") if plain else d.values.get("P_W")
+    _power(values, names, notes, bare, unit_alone(d.headings.get("P_W", "")) is not None)
     if plain and "power_W" in values:
         notes.append("power_W: taken as shaft power; if a wattmeter read it, name the column electrical_power_W")
     none = int(np.sum(~np.isfinite(values["run"]))) if "run" in values else 0
@@ -239,9 +240,12 @@ def electrical_power(values: Mapping[str, Array]) -> Array | None:
     return None if volts is None or amps is None else volts * amps
 
 
-def _power(values: dict[str, Array], names: dict[str, str], notes: list[str], bare: Array | None) -> None:
-    """Electrical power from its factors, and what a bare P stands for: without a torque, it is a wattmeter's."""
-    beside = {"voltage_V", "current_A"} & values.keys()
+def _power(values: dict[str, Array], names: dict[str, str], notes: list[str], bare: Array | None, shown: bool) -> None:
+    """Electrical power from its factors, and what a bare P stands for: without a torque, it is a wattmeter's.
+
+    ``shown``: whether it is headed as an instrument shows it, in watts and no more.
+    """
+    beside = shown or {"voltage_V", "current_A"} & values.keys()
     product = electrical_power(values)
     with np.errstate(all="ignore"):
         share = 1.0 if bare is None or product is None else float(np.nanmedian(np.abs(bare / product)))

@@ -28,7 +28,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.base.arrays import Array
+from bemt.base.arrays import Array, middle
 from bemt.base.errors import Fault, InputError
 from bemt.data.readers.samples import MISREAD, STICKS, against_load, stuck
 from bemt.data.recordings import plateaus
@@ -82,12 +82,6 @@ def _unlike(rec: Dataset) -> bool:
     return bool(steps) and min(steps) > UNLIKE
 
 
-def _middle(v: Array) -> float:
-    """Median of what is finite; NaN of nothing."""
-    good = v[np.isfinite(v)]
-    return float(np.median(good)) if good.size else math.nan
-
-
 def _stairs(rec: Dataset) -> bool:
     """Whether most rows stand on levels, each as long as what shows a step, on which no load goes on changing.
 
@@ -100,7 +94,7 @@ def _stairs(rec: Dataset) -> bool:
     long = [rows[a:b] for a, b in plateaus.levels(told[0][rows]) if b - a >= 2 * plateaus.WINDOW]
     if len(long) < 2 or sum(map(len, long)) < 0.5 * rows.size:
         return False
-    halves = [[np.diff([_middle(v[half]) for half in np.array_split(on, 2)])[0] for on in long] for v in told]
+    halves = [[np.diff([middle(v[half]) for half in np.array_split(on, 2)])[0] for on in long] for v in told]
     return all(not np.nanmedian(np.abs(h)) > STEADY * np.nanmax(np.abs(v)) for h, v in zip(halves, told, strict=True))
 
 

@@ -6,6 +6,7 @@ import math
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import field
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,14 @@ import numpy as np
 from bemt import __version__
 from bemt.base.document import Documented
 from bemt.base.tables import number_text, or_null, text_table
+from bemt.base.unit_errors import SpeedRatio, speed_ratios
 from bemt.judge.compare.drive_laws import FAMILY, Judgement, law
-from bemt.judge.compare.matched import LOADS
+from bemt.judge.compare.matched import LOADS, WITHOUT_SPEED
 from bemt.judge.compare.recordings import (
     AS_RECORDED,
     ERROR_IN,
     IN_WIND,
+    NO_SPEED,
     NOTHING_SHARED,
     OTHER_STAND,
     REVERSED,
@@ -37,7 +40,6 @@ DAYS = (
 )
 """What tells two runs apart whose loads differ by a share."""
 SCHEMA = "bemt.comparison/1"
-_TORQUES = {"torque_Nm", "power_W", "CP", "CQ"}
 # Density is asked for unless it is this many times less likely than the likeliest cause.
 _FIRST = 5.0
 # Change of a load that days of one site can make, and from which on it is worth a thermometer, in ln.
@@ -81,6 +83,9 @@ def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
             low, high = (math.exp(f(c.x[~c.second, 0])) for f in (np.min, np.max))
             where = f"at the speeds of A, {low:.0f} to {high:.0f} rev/min"
         return {"text": f"run B again {where}, and at its airspeeds", "command": asked.command(b="B_AGAIN.csv")}
+    if change.without_speed:
+        text = "record the speed in both runs, headed rpm: at equal speed causes scale apart"
+        return {"text": text, "command": asked.command(a="A_WITH_RPM.csv", b="B_WITH_RPM.csv")}
     if said.verdict in ("insufficient", "unknown") and (letter := _unrepeatable(change)):
         run = change.a if letter == "a" else change.b
         column = run.conditions[0] if run.conditions else "COLUMN"
@@ -91,7 +96,7 @@ def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
     density = likely.get("air_density", 0.0) * _FIRST >= max(likely.values(), default=1.0)
     if density and loads and days:
         return {"text": DAYS, "command": asked.with_days()}
-    if not _TORQUES & change.ratios.keys() and change.loads is said:
+    if "torque" not in change.loads_by_name and change.loads is said:
         text = "record torque in both runs: thrust alone cannot tell gain, air and blade apart"
         return {"text": text, "command": asked.command(a="A_WITH_TORQUE.csv", b="B_WITH_TORQUE.csv")}
     again = asked.command(b="A_AGAIN.csv", rows_b=asked.rows_a, air_b=asked.air_a)
@@ -203,10 +208,12 @@ WORD = {
 # Runs at nearly one speed say nothing of a change over it: error per doubling from which it is not shown [1].
 _NO_SLOPE = 1.0
 _ROWS, _NOTES = 8, 4
+_PULSE = 0.01  # a command below is a pulse width [s], above a throttle [1]
 # Families of causes, less one, from which a headline says the change first.
 _MANY = 2
 # Probability from which a cause is said as a guess.
 _GUESS = 0.1
+_NO_CAUSE = ("none", "unknown", "doubt")
 
 
 def _shares(*values: float) -> list[str]:
@@ -227,8 +234,10 @@ def _intervals(channels: Sequence[Ratio]) -> list[list[str]]:
 
 def _range(r: Ratio) -> str:
     low, high = r.range
+    if r.kind == "at_power":
+        return f"{math.exp(low):.0f} to {math.exp(high):.0f} W"
     if r.over_command:
-        return ""
+        return f"{1e6 * low:.0f} to {1e6 * high:.0f} µs" if high < _PULSE else f"{low:.0%} to {high:.0%}"
     if high - low < 1e-9:
         return "advance ratio {:.2f} to {:.2f}".format(*r.advance_range)
     return f"{math.exp(low):.0f} to {math.exp(high):.0f} rev/min"
@@ -245,10 +254,10 @@ def text(doc: ComparedRuns, details: bool = False) -> str:
     for channel, r in doc.ratios.items():
         raw = r.ratio * r.density_ratio
         slope = "-"
-        if r.slope is not None and r.slope_error is not None and not r.over_command and r.slope_error < _NO_SLOPE:
+        if r.slope is not None and r.slope_error is not None and r.over_speed and r.slope_error < _NO_SLOPE:
             slope = f"{r.slope:+.1%} +- {r.slope_error:.1%}"
         more = [slope, f"{r.scatter:.1%}", "{}, {}".format(*r.points)]
-        rows.append([WORD.get(channel, channel), f"{raw:.4f}", *_ends(r, r.density_ratio), *more])
+        rows.append([_at(WORD.get(channel, channel), r), f"{raw:.4f}", *_ends(r, r.density_ratio), *more])
         if abs(r.density_ratio - 1.0) > 1e-6:
             coefficient = "CT" if channel == "thrust_N" else "CP"
             rows.append([f"  {coefficient} (corrected for density)", f"{r.ratio:.4f}", *_ends(r), "", "", ""])
@@ -296,15 +305,22 @@ def headline(doc: ComparedRuns) -> str:
 def _moved(doc: ComparedRuns) -> str:
     """What changed by how much: a cause in the drive has moved the drive, not the loads."""
     drive = {FAMILY.get(k, k) for k in doc.effects} == {"drive"}
-    kinds = ("speed", "voltage", "electrical") if drive else ("thrust", "torque")
-    loads = {r.kind: (WORD[c], r) for c, r in doc.ratios.items()}
+    kinds = ("speed", "voltage", "electrical") if drive else ("thrust", "torque", *WITHOUT_SPEED)
+    loads = {r.kind: (_at(WORD[c], r), r) for c, r in doc.ratios.items()}
     shown = [loads[k] for k in kinds if k in loads][:2]
     shares = _intervals([r for _, r in shown])
     return " and ".join(f"{word} {share[0]}" for (word, _), share in zip(shown, shares, strict=True))
 
 
+def _at(word: str, r: Ratio) -> str:
+    """What a ratio is of, and at what it is taken if not at the speed."""
+    return f"{word} at equal {WITHOUT_SPEED[r.kind]}" if r.kind in WITHOUT_SPEED else word
+
+
 def _open(doc: ComparedRuns, size: str) -> str:
     """Why nothing is said, and what is likeliest."""
+    if doc.rule == NO_SPEED:
+        return f"Something changed{size}; {NO_SPEED}."
     if doc.rule.endswith((IN_WIND, NOTHING_SHARED)):
         return f"These recordings cannot be compared: {doc.rule}."
     if doc.rule.startswith(SPREAD):
@@ -315,7 +331,7 @@ def _open(doc: ComparedRuns, size: str) -> str:
 
 def _likely(doc: ComparedRuns) -> list[str]:
     """Causes that are likely enough to be said as a guess, the likeliest first."""
-    return [r.effect for r in doc.ranking if r.probability >= _GUESS and r.effect not in ("none", "unknown")]
+    return [r.effect for r in doc.ranking if r.probability >= _GUESS and r.effect not in _NO_CAUSE]
 
 
 def families(effects: Sequence[str], ranking: Sequence[RankedCause] = ()) -> str:
@@ -323,7 +339,7 @@ def families(effects: Sequence[str], ranking: Sequence[RankedCause] = ()) -> str
     likely = {r.effect: r.probability for r in ranking}
     titles: dict[str, list[str]] = {}
     for k in effects:
-        if k not in ("none", "unknown"):
+        if k not in _NO_CAUSE:
             titles.setdefault(FAMILY.get(k, k), []).append(k)
     families = sorted(titles, key=lambda f: -sum(likely.get(k, 0.0) for k in titles[f]))
     return ", or ".join(_FAMILY_WORD.get(f, f) if len(titles[f]) > 1 else title_of(titles[f][0]) for f in families)
@@ -340,7 +356,7 @@ def _ends(r: Ratio, factor: float = 1.0) -> list[str]:
 
 
 def _said(doc: ComparedRuns) -> list[str]:
-    out = _of_loads({c: r for c, r in doc.ratios.items() if r.kind in ("thrust", "torque")})
+    out = _of_loads({c: r for c, r in doc.ratios.items() if r.kind in ("thrust", "torque", *WITHOUT_SPEED)})
     density, a, b = doc.density.ratio, doc.density.A, doc.density.B
     if density and abs(density - 1.0) > 0.003:
         ends = f"Recorded density: {a:.4g} to {b:.4g} kg/m3" if a and b else "Density from the recorded temperatures"
@@ -349,11 +365,17 @@ def _said(doc: ComparedRuns) -> list[str]:
     told = (doc.told or ()) if doc.diagnosis else (sentence(doc),)
     said_below = ("Next: ", "bemt ", "if ")
     out += [t for t in told if not (step.get("text") and t.lstrip().startswith(said_below))]
+    if not doc.diagnosis and "rpm_scale" in (*doc.effects, *_likely(doc)):
+        out += [
+            f"A miscount of {m.true}/{m.set} fits: in B, {m.words}; or the inverse in A." for m in _miscounts(doc)[:1]
+        ]
     drive = doc.subsystems.get("drive")
     if drive and drive.effects and drive.effects != doc.effects:
         out.append(f"Drive: {drive.verdict}: {', '.join(title_of(k) for k in drive.effects)}.")
     elif drive and doc.verdict != "none" and drive.verdict == "none":
-        out.append("Drive: no change beyond scatter.")
+        moved = [r for r in doc.ratios.values() if r.over_command and not r.low95 < 1.0 < r.high95]
+        rest = "what load, voltage or a miscount explains" if moved else "scatter"
+        out.append(f"Drive: no change beyond {rest}.")
     if step.get("text"):
         out.append(f"Next: {step['text']}.")
     out = [textwrap.fill(line, 110, initial_indent="  ", subsequent_indent="    ") for line in out]
@@ -361,6 +383,13 @@ def _said(doc: ComparedRuns) -> list[str]:
         out += [f"    {t.strip()}" for t in told if t.lstrip().startswith("if ")]
         out.append(f"    {step['command']}")
     return out
+
+
+def _miscounts(doc: ComparedRuns) -> list[SpeedRatio]:
+    """Miscounts of the speed that move the loads as they moved, the commonest first."""
+    r = next((r for r in doc.ratios.values() if r.kind == "thrust"), None)
+    ends = (r.high95**-0.5, r.low95**-0.5) if r else (math.inf, 0.0)
+    return [m for m in speed_ratios(nearest=Fraction(8, 7)) if ends[0] < m.ratio < ends[1]]
 
 
 def _of_loads(loads: Mapping[str, Ratio]) -> list[str]:
@@ -371,8 +400,9 @@ def _of_loads(loads: Mapping[str, Ratio]) -> list[str]:
     words = [f"{WORD[c]} {at} ({low} to {high})" for c, (at, low, high) in zip(loads, intervals, strict=True)]
     where = "extrapolated to one speed" if first.extrapolated else _range(first)
     grows = [WORD[c] for c, r in loads.items() if r.depends_on]
-    more = f"The ratio of {' and '.join(grows)} changes with speed or advance ratio."
-    return [f"B against A at equal speed, {where}: {', '.join(words)}; 95 % in brackets.", *([more] if grows else [])]
+    at = WITHOUT_SPEED.get(first.kind, "speed")
+    more = f"The ratio of {' and '.join(grows)} changes with {'it' if at != 'speed' else 'speed or advance ratio'}."
+    return [f"B against A at equal {at}, {where}: {', '.join(words)}; 95 % in brackets.", *([more] if grows else [])]
 
 
 def sentence(doc: ComparedRuns) -> str:

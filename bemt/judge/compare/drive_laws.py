@@ -18,9 +18,9 @@ from bemt.base.arrays import Array
 from bemt.base.gaussian.evidence import LinearTerms, log_sum, shares
 from bemt.base.gaussian.whitening import log_density, whitener
 from bemt.judge.compare import smooth_change as fits
-from bemt.judge.compare.matched import MatchedChannel
+from bemt.judge.compare.matched import FOLLOWS_LOAD, POWER_OF_SPEED, MatchedChannel
 from bemt.judge.compare.smooth_change import Scatter
-from bemt.judge.explanation import NONE, UNKNOWN, Explanation, Sizes
+from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation, Sizes
 from bemt.judge.loss import Decision, decide
 from bemt.physics.effects.base import FORM
 
@@ -35,7 +35,7 @@ SUPPLY = Explanation.of("battery_sag")
 _BY_VOLTS = {"speed": (0.85, 0.15), "electrical": (0.0, 0.5)}
 TOLD_VOLTAGE = 0.03
 """Voltages of battery or supply that were read apart by more than this at equal command are a cause, ln [1]."""
-BY_LOAD = {"speed": (-0.13, 0.09), "electrical": (1.0, 0.25)}
+BY_LOAD = {"speed": (-0.13, 0.09), "electrical": (1.0, FOLLOWS_LOAD)}
 """How speed at one command and power at one speed follow the torque, as powers with their standard deviations: at
 voltage V and a drop I R of 5 to 40 % of the rest dn/n = -c/(1 + 2 c) dQ/Q with c = I R/(V - I R); losses go with the
 square of the torque (declared)."""
@@ -124,6 +124,7 @@ LAWS: tuple[DriveLaw, ...] = (
     ),
 )  # fmt: skip
 """Causes behind the rotor."""
+_EACH = (1.0 - sum(_PRIOR.values())) / len(LAWS)
 
 
 def law(name: str) -> DriveLaw | None:
@@ -162,8 +163,36 @@ class Load:
     """How much more torque B takes than A at one speed, natural logarithm."""
 
     change: float = 0.0  # Mean
+    miscount: float = 0.0  # What the speed of B reads over what it is; the change is that at the true speed
     unsure: float = 0.0  # Standard deviation of the mean
     varies: float = 0.0  # Largest departure from the mean
+
+
+_READ = {"speed": 1.0, "electrical": -POWER_OF_SPEED["electrical_power_W"]}
+"""Power of what a speed reads over what it is, with which a channel of the drive goes."""
+
+
+def log_density_of_ratios(ratios: Mapping[str, tuple[float, float]], volts: float | None, load: Load) -> float:
+    """Log density of ratios of the drive, whatever changed it: ``ratios`` and ``volts`` as ln and standard deviation.
+
+    >>> read = {"speed": (0.154, 0.02), "electrical": (-0.462, 0.03)}  # 7/6 of a speed that did not change
+    >>> miscounted, turned = Load(0.0, 0.154, 0.02), Load(-0.31, 0.0, 0.02)
+    >>> log_density_of_ratios(read, 0.0, miscounted) > log_density_of_ratios(read, 0.0, turned) + 3.0
+    True
+    """
+    names, v = list(ratios), volts or 0.0
+    by_volts, by_load = (np.array([table.get(k, (0.0, 0.0)) for k in names]).T for table in (_BY_VOLTS, BY_LOAD))
+    y, unsure = np.array([ratios[k] for k in names]).T
+    y = y - by_volts[0] * v - by_load[0] * load.change - [_READ[k] * load.miscount for k in names]
+    own = np.diag(unsure**2 + (by_volts[1] * v) ** 2 + (by_load[1] * load.change) ** 2)
+    own += load.unsure**2 * np.outer(by_load[0], by_load[0])
+    ways = [(PRIOR["none"], 0.0 * own)]
+    ways += [(PRIOR["unknown"] / len(_UNKNOWN_KINDS), size**2 * np.eye(y.size)) for size, *_ in _UNKNOWN_KINDS]
+    for row in LAWS:
+        if volts is None or row.id not in SUPPLY:
+            T = np.array([[w * term.get(k, {}).get("all", 0.0) for k in names] for w, term in row.terms])
+            ways += [(_EACH / len(row.sizes), size**2 * T.T @ T) for size in row.sizes]
+    return float(log_sum([math.log(w) + log_density(own + C, y) for w, C in ways]))
 
 
 def _followed(
@@ -175,7 +204,7 @@ def _followed(
         (by_volts, more_volts), (by_load, more_load) = _BY_VOLTS.get(name, (0.0, 0.0)), BY_LOAD.get(name, (0.0, 0.0))
         basis = _bases(c)
         b, v = basis["all"], np.broadcast_to(volts.get(name, 0.0), c.y.shape)
-        mean[name] = b * (by_volts * v + by_load * load.change)
+        mean[name] = b * (by_volts * v + by_load * load.change + _READ.get(name, 0.0) * load.miscount)
         level = b * math.hypot(more_load * load.change, by_load * load.unsure)
         columns = np.column_stack([*(more_volts * v * basis[k] for k in ("all", "ramp", "bow")), level])
         # another load is another curve over the command
@@ -214,8 +243,7 @@ def weigh(
     """
     found = [_weighed(channels, scatter, load) for scatter in scatters]
     score = {k: float(log_sum([z[k] for z in found])) for k in found[0]}
-    each = (1.0 - sum(_PRIOR.values())) / len(LAWS)
-    log_prior = {k: math.log(_PRIOR.get(k, each)) for k in score}
+    log_prior = {k: math.log(_PRIOR.get(k, _EACH)) for k in score}
     share = shares([score[k] + log_prior[k] for k in score]).tolist()
     return dict(sorted(zip(score, share, strict=True), key=lambda kv: -kv[1]))
 
@@ -275,6 +303,15 @@ def _any_change(channels: Mapping[str, MatchedChannel], base: Mapping[str, Array
             total += log_density(base[name] + free, y) - log_density(base[name], y)
         found.append(total)
     return float(log_sum(found)) - math.log(len(found))
+
+
+def weigh_factor(c: MatchedChannel, s: Scatter) -> dict[Explanation, float]:
+    """Probability that a channel changed by one factor, or nearly so, by what nobody can tell: "doubt"; or not."""
+    y, C = c.y - c.y.mean(), fits.covariance(c, s)
+    found = [log_density(C + size**2 * fits.steady_change(c), y) for size, *_ in _UNKNOWN_KINDS]
+    none = math.log(PRIOR["none"]) + log_density(C, y)
+    changed = math.log((1.0 - PRIOR["none"]) / len(found)) + float(log_sum(found))
+    return dict(zip((NONE, DOUBT), shares([none, changed]).tolist(), strict=True))
 
 
 def judge_drive(P: Mapping[Explanation, float]) -> Judgement:

@@ -20,7 +20,7 @@ from bemt.base import canvas
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.judge.compare.change_document import WORD, ComparedRuns, headline
-from bemt.judge.compare.matched import POWER_OF_SPEED
+from bemt.judge.compare.matched import OVER_COMMAND, POWER_OF_SPEED, WITHOUT_SPEED
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case import Case
 from bemt.rotors.case.propagate import propagate
@@ -217,7 +217,6 @@ _AXIS = {
     "voltage_V": "voltage [V]",
 }  # fmt: skip
 _COMMAND = {"pwm_s": ("pulse width [µs]", 1e6), "throttle": ("throttle [-]", 1.0)}
-_OVER_COMMAND = ("speed", "voltage")
 # Speeds that vary by less than this share are one.
 _STEADY = 0.05
 # Characters in a line of the title.
@@ -263,7 +262,7 @@ def title(doc: ComparedRuns) -> str:
 
 def _along(c: MatchedChannel) -> int:
     """Coordinate of the abscissa: the advance ratio where it alone varies."""
-    steady = c.name not in _OVER_COMMAND and float(np.ptp(c.x[:, 0])) < _STEADY
+    steady = c.name not in OVER_COMMAND and float(np.ptp(c.x[:, 0])) < _STEADY
     return 1 if steady and c.advance_moves() else 0
 
 
@@ -271,10 +270,10 @@ def _axis(change: RunChange, c: MatchedChannel) -> tuple[str, Callable[[Array], 
     """Label of the abscissa, and the coordinate in its unit."""
     if _along(c):
         return _advance(change)[0], lambda x: x
-    if c.name in _OVER_COMMAND:
+    if c.name in OVER_COMMAND:
         label, factor = _COMMAND[change.a.command]
         return label, lambda x: x * factor
-    return _AXIS["rpm"], np.exp
+    return "electrical power [W]" if c.name == "at_power" else _AXIS["rpm"], np.exp
 
 
 def _advance(change: RunChange) -> tuple[str, str, str]:
@@ -298,14 +297,16 @@ def _range(change: RunChange, c: MatchedChannel, side: bool) -> str:
 
 def _readings(axis: Any, change: RunChange, c: MatchedChannel) -> None:
     shift = np.where(c.second, c.log_density, 0.0)
-    y = np.exp(c.y + shift) * 60.0 ** POWER_OF_SPEED.get(c.channel, 0.0)
+    bare = c.name in WITHOUT_SPEED
+    y = np.exp(c.y + shift) * (1.0 if bare else 60.0 ** POWER_OF_SPEED.get(c.channel, 0.0))
     label, scaled = _axis(change, c)
     x = scaled(c.x[:, _along(c)])
     for side, colour, mark, name in ((False, _A, "o", "A"), (True, _B, "s", "B")):
         own = c.second == side
         name += _range(change, c, side)
         axis.plot(x[own], y[own], mark, color=colour, ms=3.5, mfc="none" if side else colour, label=name)
-    axis.set_ylabel(_AXIS.get(c.channel, c.channel))
+    own_label = "thrust / P^(2/3) [N W^(-2/3)]" if c.name == "at_power" else "thrust [N]"
+    axis.set_ylabel(own_label if bare else _AXIS.get(c.channel, c.channel))
     axis.set_xlabel(label)
     axis.legend(loc="best")
     axis.ticklabel_format(axis="y", style="sci", scilimits=(-2, 4))
@@ -332,8 +333,12 @@ def _ratio(axis: Any, change: RunChange, c: MatchedChannel) -> None:
     axis.axhline(1.0, color=_GREY, lw=0.8)
     if r.density_ratio != 1.0:
         axis.axhline(r.density_ratio, color=_B, lw=1.0, ls="--", label="recorded density")
-    if c.name not in _OVER_COMMAND:
-        both = f"equal speed and {_advance(change)[0].partition(' [')[0]}" if c.advance_moves() else "equal speed"
+    if c.name not in OVER_COMMAND:
+        both = (
+            f"equal speed and {_advance(change)[0].partition(' [')[0]}"
+            if c.advance_moves()
+            else (f"equal {WITHOUT_SPEED.get(c.name, 'speed')}")
+        )
         far = low > high + _STEADY
         axis.set_title("no common speed: extrapolated" if far else f"at {both}")
     axis.set_ylabel(f"{word}: B / A")

@@ -209,6 +209,10 @@ LOADS = {"thrust": ("thrust_N", "CT"), "torque": ("torque_Nm", "power_W", "CP", 
 """Loads of the rotor: first what a cell reads, then what stands for it; electrical power only at like voltage."""
 DRIVE = {"speed": ("rpm",), "electrical": ("electrical_power_W",), "voltage": ("voltage_V",)}
 """Drive behind the rotor: speed and voltage at equal command, electrical power at equal speed."""
+WITHOUT_SPEED = {"at_power": "electrical power", "at_command": "command"}
+"""What thrust is compared at where no speed is recorded: electrical power first, which leaves the battery out; at rest
+T ~ P^(2/3) of an ideal rotor."""
+OVER_COMMAND = ("speed", "voltage", "at_command")
 POWER_OF_SPEED = {"thrust_N": 2.0, "torque_Nm": 2.0, "power_W": 3.0, "electrical_power_W": 3.0}
 _COEFFICIENTS = ("CT", "CP", "CQ")
 
@@ -220,14 +224,15 @@ _STARTED = {"rpm": 0.3, "electrical_power_W": 0.1}
 _NEAR_ZERO = 0.15
 MOST = 60
 """Points of a recording in the fit; more are averaged with their neighbours in speed. [1]"""
-SESSION = {"thrust": 0.007, "torque": 0.010, "speed": 0.015, "electrical": 0.02, "voltage": 0.02}
+SESSION = {"thrust": 0.007, "torque": 0.010, "speed": 0.015, "electrical": 0.02, "voltage": 0.02,
+           "at_power": math.hypot(0.007, 0.02 / 1.5), "at_command": math.hypot(0.007, 2.0 * 0.015)}  # fmt: skip
 """Standard deviation of the level of one run where the recordings do not show it, share: two runs differ by 1.4 times
 this. Repeated runs of one stand that were set up anew differ by 1 % in thrust and 1.4 % in torque (runs of the UIUC
-Propeller Database and of J. Majewski's stand, seen here)."""
-BY_POWER = 0.03
-"""What the losses of a motor differ by from run to run, where electrical power stands for torque, share."""
-EFFICIENCY = 0.08
-"""The same from reading to reading, beyond their law with the load."""
+Propeller Database and of J. Majewski's stand, seen here); electrical power at equal speed by 2.6 %, its losses with it
+(68 pairs of runs of that stand: 1.8 % per run, and as much along the speed)."""
+FOLLOWS_LOAD = 0.25
+"""Standard deviation of the power with which electrical power at one speed follows the torque, about 1: 0.78 +- 0.12 of
+119 pairs of runs of six motors with two propellers (J. Majewski's stand) [1]."""
 # Level of the speed where the voltage is known.
 _AT_KNOWN_VOLTAGE = 0.01
 BY_THERMOMETER = 0.012
@@ -264,7 +269,7 @@ class MatchedChannel:
         """Range of the first coordinate that both recordings have; low above high: none."""
         a, b = self.x[~self.second, 0], self.x[self.second, 0]
         low, high = max(float(a.min()), float(b.min())), min(float(a.max()), float(b.max()))
-        if self.name not in ("speed", "voltage") and high < low < high + _ONE_SPEED:
+        if self.name not in OVER_COMMAND and high < low < high + _ONE_SPEED:
             return high, low
         return low, high
 
@@ -305,17 +310,23 @@ def _readings(run: StandRun, name: str, channel: str, diameter: float) -> dict[s
     if v is None or np.isfinite(v).sum() < 2:
         return None
     rpm = run.points.values.get("rpm")
-    over_command = name in ("speed", "voltage")
+    over_command = name in OVER_COMMAND
     if over_command and "command" not in run.points:
         return None
-    if rpm is None and (name not in LOADS or channel not in _COEFFICIENTS):
+    if rpm is None and channel not in _COEFFICIENTS and name not in WITHOUT_SPEED:
         return None
-    speed = rpm if rpm is not None else np.ones(len(run))
+    if name == "at_power":
+        if "electrical_power_W" not in run.points:
+            return None
+        speed, to = run.points["electrical_power_W"], 1.0 / 1.5
+    else:
+        speed = rpm if rpm is not None else np.ones(len(run))
+        to = 0.0 if name == "at_command" else POWER_OF_SPEED.get(channel, 0.0)
     first = run.points["command"] if over_command else np.log(np.where(speed > 0.0, speed, np.nan))
     sign = float(np.sign(np.nansum(v)))
     size = np.where(v * sign > 0.0, v * sign, np.nan)
     top = float(np.nanmax(size)) if np.isfinite(size).any() else math.nan
-    scaled = size / speed ** POWER_OF_SPEED.get(channel, 0.0)
+    scaled = size / speed**to
     good = np.isfinite(scaled) & np.isfinite(first) & (size > _STARTED.get(channel, _SMALL) * top) & (speed > 0.0)
     if name in LOADS:
         level = np.nanpercentile(np.where(good, scaled, np.nan), 90) if good.any() else math.nan
@@ -323,9 +334,10 @@ def _readings(run: StandRun, name: str, channel: str, diameter: float) -> dict[s
     if good.sum() < 2:
         return None
     stated = run.points.u[channel] / size
+    still = over_command or name in WITHOUT_SPEED
     return {
         "y": np.log(scaled[good]),
-        "x": np.column_stack([first, advance(run, diameter) if not over_command else np.zeros(len(run))])[good],
+        "x": np.column_stack([first, np.zeros(len(run)) if still else advance(run, diameter)])[good],
         "floor": top / size[good],
         "u": np.nan_to_num(stated[good]),
         "sign": np.full(int(good.sum()), sign),
@@ -356,8 +368,8 @@ def _averaged(part: dict[str, Array]) -> dict[str, Array]:
 
 def matched(a: StandRun, b: StandRun, name: str, diameter: float = math.nan) -> MatchedChannel | None:
     """Bring one channel of two recordings together."""
-    choices = {**LOADS, **DRIVE}[name]
-    if name in ("speed", "voltage") and (a.command != b.command or not a.command):
+    choices = {**LOADS, **DRIVE}.get(name, ("thrust_N",))
+    if name in OVER_COMMAND and (a.command != b.command or not a.command):
         return None
     able = [c for c in choices if name not in LOADS or c != "electrical_power_W" or like_voltage(a, b)]
     tried = ((c, _readings(a, name, c, diameter), _readings(b, name, c, diameter)) for c in able)
@@ -416,11 +428,19 @@ def density_change(a: StandRun, b: StandRun) -> tuple[float, float]:
 
 def _set_up(name: str, channel: str, a: StandRun, b: StandRun) -> float:
     """Standard deviation of the level of one run where the recordings do not show it."""
-    if name in LOADS and channel == "electrical_power_W":
-        return BY_POWER
+    if channel == "electrical_power_W":
+        return SESSION["electrical"]
     if name == "speed" and all("voltage_V" in r.points for r in (a, b)):
         return _AT_KNOWN_VOLTAGE
     return SESSION[name]
+
+
+def losses_differ(change: Array | float) -> Array:
+    """What a torque from electrical power is off by, share, where the power at one speed changed by ln ``change``.
+
+    One motor in both runs: its losses are those of the other run but for what moves them, the day and the load.
+    """
+    return np.hypot(SESSION["electrical"], FOLLOWS_LOAD * np.asarray(change))
 
 
 def taken(c: MatchedChannel, keep: NDArray[np.bool_]) -> MatchedChannel:
@@ -432,7 +452,7 @@ def taken(c: MatchedChannel, keep: NDArray[np.bool_]) -> MatchedChannel:
 def in_common(c: MatchedChannel) -> MatchedChannel:
     """Points where both recordings were, with a margin; all where they have no range in common."""
     low, high = c.common()
-    margin = MARGIN if c.name not in ("speed", "voltage") else MARGIN * float(np.ptp(c.x[:, 0]))
+    margin = MARGIN if c.name not in OVER_COMMAND else MARGIN * float(np.ptp(c.x[:, 0]))
     keep = (c.x[:, 0] >= low - margin) & (c.x[:, 0] <= high + margin)
     slow, fast = c.common_advance()
     if slow < fast:

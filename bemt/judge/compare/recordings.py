@@ -15,8 +15,26 @@ import numpy as np
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.judge.compare import smooth_change as fits
-from bemt.judge.compare.drive_laws import SUPPLY, TOLD_VOLTAGE, Judgement, Load, judge_drive, weigh
-from bemt.judge.compare.matched import DRIVE, LOADS, MatchedChannel, StandRun, advance, density_change
+from bemt.judge.compare.drive_laws import (
+    SUPPLY,
+    TOLD_VOLTAGE,
+    Judgement,
+    Load,
+    judge_drive,
+    log_density_of_ratios,
+    weigh,
+    weigh_factor,
+)
+from bemt.judge.compare.matched import (
+    DRIVE,
+    LOADS,
+    POWER_OF_SPEED,
+    WITHOUT_SPEED,
+    MatchedChannel,
+    StandRun,
+    advance,
+    density_change,
+)
 from bemt.judge.explanation import NONE, Size
 from bemt.judge.loss import SECOND, Decision, decide, joined, parts
 
@@ -43,6 +61,8 @@ NOTHING_SHARED = "the two runs have no common speed and advance ratio"
 """Reason where every ratio would be one of two extrapolations."""
 IN_WIND = "as in wind, and no airspeed is recorded"
 """End of the reason where one recording shows a wind that it does not state."""
+NO_SPEED = "without the speed rotor, motor and scale look alike"
+"""Reason where thrust was compared at equal power or command."""
 OTHER_STAND = "no change on one stand moves every load by this much: check units and speeds of both files"
 
 
@@ -65,7 +85,12 @@ class RunChange:
     @cached_property
     def loads(self) -> Judgement:
         """Verdict on what acts on the rotor, worked out when it is asked for."""
-        return self.judge(self) if self.loads_by_name else NO_VERDICT
+        if not self.without_speed:
+            return self.judge(self) if self.loads_by_name else NO_VERDICT
+        ((name, c),) = self.rotor.channels.items()
+        P = weigh_factor(c, self.rotor.likelier[name])
+        said = decide(P)
+        return Judgement.of(replace(said, why=NO_SPEED) if said.by == "files" else said, P)
 
     @cached_property
     def drive(self) -> Judgement:
@@ -74,7 +99,7 @@ class RunChange:
             return NO_VERDICT
         if _unloaded(self.a, self.b, self.diameter_m):
             return replace(NO_VERDICT, why="the advance ratios differ, and the drive follows the load")
-        P = weigh(self.behind.channels, (self.behind.free, self.behind.steady), self._load)
+        P = weigh(self.behind.channels, (self.behind.free, self.behind.steady), self._load(self._miscount))
         if not self._by_volts:
             return judge_drive(P)
         # known from the files: what is left is whether something else changed as well
@@ -92,22 +117,44 @@ class RunChange:
         return change if "speed" in self.behind.channels and abs(change) >= TOLD_VOLTAGE else 0.0
 
     @property
-    def _load(self) -> Load:
+    def _miscount(self) -> float:
+        """What the speed of B reads over what it is, natural logarithm, if the loads say so."""
+        said = self.loads.parameters.get("rpm_scale")
+        return math.log(said["factor"].value * (1.0 + said["eps"].value)) if said else 0.0
+
+    def told_by_drive(self, miscount: float) -> float:
+        """Log odds that speeds of B read exp(``miscount``) times what they are, as the drive takes them [1]."""
+        at = {r.kind: (math.log(r.ratio), math.log(r.high68 / r.low68) / 2.0) for r in self.ratios.values()}
+        drive: dict[str, tuple[float, float]] = {k: at[k] for k in ("speed", "electrical") if k in at}
+        if "speed" not in drive:
+            return 0.0
+        volts = at["voltage"][0] if "voltage" in at else None
+        read, right = (log_density_of_ratios(drive, volts, self._load(x)) for x in (miscount, 0.0))
+        return read - right
+
+    def _load(self, miscount: float) -> Load:
         """How the load of the drive changed; where torque is not recorded, thrust tells it by half."""
         found = {r.kind: r for r in self.ratios.values() if r.kind in LOADS}
         r = found.get("torque", found.get("thrust"))
         if r is None:
-            return Load()
-        change, unsure = math.log(r.ratio), math.log(r.high68 / r.low68) / 2.0
-        along = np.log([point[2] for point in r.curve])
-        varies = float(np.max(np.abs(along - change)))
-        return Load(change, unsure if "torque" in found else math.hypot(unsure, _BY_THRUST * change), varies)
+            return Load(miscount=miscount)
+        unsure, along = math.log(r.high68 / r.low68) / 2.0, np.log([point[2] for point in r.curve])
+        varies = float(np.max(np.abs(along - math.log(r.ratio))))
+        channel = next(c for c, one in self.ratios.items() if one is r)
+        change = math.log(r.ratio) + POWER_OF_SPEED.get(channel, 2.0) * miscount
+        unsure = unsure if "torque" in found else math.hypot(unsure, _BY_THRUST * change)
+        return Load(change, miscount, unsure, varies)
 
     @property
     def density_ratio(self) -> float:
         """Recorded density of B over that of A, by thermometers alone if need be; NaN unless both tell."""
         log_ratio, unsure = density_change(self.a, self.b)
         return math.exp(log_ratio) if unsure else self.b.density / self.a.density
+
+    @property
+    def without_speed(self) -> str:
+        """What thrust is compared at, in words, where no speed is recorded; else ""."""
+        return next((words for name, words in WITHOUT_SPEED.items() if name in self.channels), "")
 
     @property
     def loads_by_name(self) -> dict[str, MatchedChannel]:
@@ -195,12 +242,15 @@ def changed(
     rotor = fits.prepared(a, b, tuple(LOADS), diameter)
     used = {c.channel for c in rotor.channels.values()}
     behind = fits.prepared(a, b, [k for k, names in DRIVE.items() if not used & set(names)], diameter)
+    for name in WITHOUT_SPEED:
+        if not rotor.channels and not behind.channels:
+            rotor = fits.prepared(a, b, (name,), diameter)
     channels = {**rotor.channels, **behind.channels}
     if not channels:
         silent = [r for r in (a, b) if not {"rpm", "J"} & r.points.values.keys()]
         if silent:
-            hint = "Head the column rpm; nothing can be compared but at equal speed"
-            expected = "a speed of rotation, or J"
+            hint = "Head the column rpm, or record watts: thrust is compared at equal speed, power or throttle"
+            expected = "a speed of rotation, J, electrical power or a throttle in both"
             raise InputError([Fault(r.points.name, "", _told(r), expected, hint) for r in silent])
         got = f"{_told(a)} in A, {_told(b)} in B"
         raise InputError(
@@ -256,6 +306,10 @@ def _assumed(a: StandRun, b: StandRun, diameter: float, loads: Mapping[str, Matc
          "torque is not recorded in both: thrust alone cannot tell gain, air and blade apart"),
         ("electrical_power_W" in names,
          "torque is not recorded: electrical power replaces it, assuming the same motor and controller in both"),
+        ("at_power" in loads,
+         "speed is not recorded in both: electrical power replaces it, of one motor and controller"),
+        ("at_command" in loads,
+         "speed is not recorded in both: the command replaces it, of one motor and controller at one voltage"),
         (no_diameter and any(c.advance_moves() for c in loads.values()),
          "no diameter: compared at equal advance per turn, V/n; --label 10x5 gives J"),
     )  # fmt: skip

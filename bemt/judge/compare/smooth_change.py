@@ -22,7 +22,17 @@ from bemt.base.arrays import Array
 from bemt.base.document import Documented
 from bemt.base.gaussian.kernels import alike, smooth
 from bemt.base.gaussian.whitening import leave_one_out, log_density, whitener
-from bemt.judge.compare.matched import LOADS, MARGIN, MatchedChannel, StandRun, in_common, matched, taken
+from bemt.judge.compare.matched import (
+    LOADS,
+    MARGIN,
+    OVER_COMMAND,
+    WITHOUT_SPEED,
+    MatchedChannel,
+    StandRun,
+    in_common,
+    matched,
+    taken,
+)
 
 BEND = 0.7
 """Slow bend of what a run differs by from others, over its level [1]."""
@@ -51,7 +61,7 @@ class Scatter:
 
 def _lengths(c: MatchedChannel) -> Array:
     """Length scales of the curve, in the coordinates of the channel."""
-    first = _LENGTH_SPEED if c.name not in ("speed", "voltage") else 0.4 * max(float(np.ptp(c.x[:, 0])), 1e-12)
+    first = _LENGTH_SPEED if c.name not in OVER_COMMAND else 0.4 * max(float(np.ptp(c.x[:, 0])), 1e-12)
     return np.array([first, _LENGTH_ADVANCE * max(float(np.ptp(c.x[:, 1])), 1e-9)])
 
 
@@ -147,7 +157,7 @@ def without_strays(c: MatchedChannel) -> tuple[MatchedChannel, int]:
 class Ratio(Documented):
     """B over A of one channel at equal speed, or equal command for the drive."""
 
-    kind: str  # thrust, torque, speed, voltage or electrical
+    kind: str  # thrust, torque, speed, voltage or electrical; at_power, at_command: thrust without a speed
     ratio: float
     low68: float
     high68: float
@@ -171,7 +181,12 @@ class Ratio(Documented):
     @property
     def over_command(self) -> bool:
         """Whether it is one at equal command."""
-        return self.kind in ("speed", "voltage")
+        return self.kind in OVER_COMMAND
+
+    @property
+    def over_speed(self) -> bool:
+        """Whether it is one at equal speed."""
+        return not self.over_command and self.kind not in WITHOUT_SPEED
 
 
 def ratio_of(c: MatchedChannel, s: Scatter) -> Ratio:
@@ -219,7 +234,7 @@ def _slopes(c: MatchedChannel, at: NDArray[np.intp], d: Array, cov: Array) -> di
     out: dict[str, float] = {}
     names = ("slope", "advance_slope")
     unit = (
-        math.log(2.0) if c.name not in ("speed", "voltage") else max(float(np.ptp(c.x[at, 0])), 1e-12),
+        math.log(2.0) if c.name not in OVER_COMMAND else max(float(np.ptp(c.x[at, 0])), 1e-12),
         max(float(np.ptp(c.x[at, 1])), 1e-12),
     )
     columns = [k for k in (0, 1) if np.ptp(c.x[at, k]) > 1e-6]

@@ -11,7 +11,7 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.data.recordings.slips import Level, outlier_runs
-from bemt.judge.compare.matched import BY_POWER, EFFICIENCY, like_volts
+from bemt.judge.compare.matched import SESSION, like_volts, losses_differ
 from bemt.judge.diagnose import repeats
 from bemt.judge.diagnose.blade import PLAIN, CalibratedBlade, calibrated, prior_of
 from bemt.judge.diagnose.noise import in_time, loading
@@ -191,10 +191,14 @@ def _by_power(part: Part, losses: Array) -> Part:
     """Part with a torque from its electrical power."""
     record = part.record
     torque = record.extra["electrical_power_W"] / (part.flow.omega * losses)
-    size, note = np.abs(torque), "torque: not recorded; electrical power stands for it, losses as in the reference"
+    size, usual = np.abs(torque), np.abs(part.flow.Q0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        u = size * losses_differ(np.where((size > 0.0) & (usual > 0.0), np.log(size / usual), 0.0))
+    note = "torque: not recorded; electrical power stands for it, losses as in the reference"
     told = replace(
-        record, measured={**record.measured, "torque_Nm": torque}, u={**record.u, "torque_Nm": EFFICIENCY * size},
-        zero={**record.zero, "torque_Nm": BY_POWER * float(np.max(size))}, electrical=True, notes=(*record.notes, note),
+        record, measured={**record.measured, "torque_Nm": torque}, u={**record.u, "torque_Nm": u},
+        zero={**record.zero, "torque_Nm": SESSION["electrical"] * float(np.max(size))}, electrical=True,
+        notes=(*record.notes, note),
     )  # fmt: skip
     return replace(part, record=told, _solved={})
 

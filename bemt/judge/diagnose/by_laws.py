@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,14 +14,13 @@ from bemt.judge import loss
 from bemt.judge.compare import recordings
 from bemt.judge.compare.drive_laws import Judgement
 from bemt.judge.compare.matched import (
-    BY_POWER,
-    EFFICIENCY,
     LOADS,
     MARGIN,
     SESSION,
     density_change,
     like_voltage,
     log_range,
+    losses_differ,
 )
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import knowledge, posterior, signatures
@@ -44,8 +43,8 @@ if TYPE_CHECKING:
 
 MOST = 40
 """Points of a recording that are weighed; more are averaged with alike ones [1]."""
-# Speed at equal command of one motor, natural logarithm: battery and load change it by no more.
-_SAME_DRIVE = 0.06
+# Log odds below which nothing is counted.
+_SHUT = -60.0
 # Speed below this share of the largest: a rotor that has just set off.
 _STARTED = 0.15
 _COVARIATES = ("time_s", "temperature_K", "tip_gap_m", "wall_distance_m", "second_rotor_rad_s", "run")
@@ -118,7 +117,7 @@ def weighed(
     pair: RunChange, only: Collection[str] | None = None, gone: Collection[str] = ()
 ) -> posterior.Evidence | None:  # fmt: skip
     """Explanations of what changed from A to B, weighed; None where nothing can be."""
-    both = records_of(pair.a, pair.b, pair.diameter_m, pair.rotor.likelier)
+    both = records_of(pair)
     if both is None:
         return None
     known, test = both
@@ -135,34 +134,24 @@ def weighed(
 
 
 def _as_counted(candidate: Candidate, pair: RunChange) -> Candidate | None:
-    """Candidate without what the recordings rule out besides the loads; None where nothing is left.
+    """Candidate with the odds that the recordings tell besides the loads; None where they rule it out.
 
-    One motor at one command turns as fast as before, whatever is indicated. What two thermometers leave open of the
-    density counts as repeatability.
+    One motor at one command turns about as fast as before, whatever is indicated. What two thermometers leave open of
+    the density counts as repeatability.
     """
     if candidate.id == "air_density" and density_change(pair.a, pair.b)[1]:
         return None
-    r = next((r for r in pair.ratios.values() if r.kind == "speed"), None)
-    if r is None or candidate.id not in ("rpm_scale", "unit_slip"):
+    if candidate.id not in ("rpm_scale", "unit_slip"):
         return candidate
-
-    def fits(setting: Mapping[str, Any]) -> bool:
-        if setting.get("channel", "rpm") != "rpm":
-            return True
-        ratio = abs(setting["factor"]) * (1.0 + setting.get("eps", 0.0))
-        unsure = _SAME_DRIVE + math.log(r.high95 / r.ratio)
-        return abs(math.log(r.ratio / ratio)) < unsure
-
-    return candidate.only(np.array([fits(s) for s in candidate.settings]))
+    read = [abs(s["factor"]) * (1.0 + s.get("eps", 0.0)) if s.get("channel", "rpm") == "rpm" else 1.0
+            for s in candidate.settings]  # fmt: skip
+    told = np.array([max(pair.told_by_drive(math.log(x)), _SHUT) for x in read])
+    return replace(candidate, weight=candidate.weight * np.exp(told))
 
 
-def records_of(
-    a: StandRun, b: StandRun, diameter_m: float, scatter: Mapping[str, Scatter]
-) -> tuple[Record, Record] | None:  # fmt: skip
-    """Both recordings with the same channels, A as reference, in the air that both tell.
-
-    ``scatter`` of single readings as both recordings show it, by thrust and torque.
-    """
+def records_of(pair: RunChange) -> tuple[Record, Record] | None:
+    """Both recordings with the same channels, A as reference, in the air that both tell."""
+    a, b, diameter_m = pair.a, pair.b, pair.diameter_m
     channels = _channels_of(a, b)
     if not channels:
         return None
@@ -172,8 +161,10 @@ def records_of(
     D = diameter_m if math.isfinite(diameter_m) else _D
     # what lags on the way up and down in one of them may be a zero of the other
     shift = {c: max(r.shift.get(c, 0.0) for r in (a, b)) for c in channels.values()}
+    power = pair.ratios.get("electrical_power_W")
+    losses = float(losses_differ(math.log(power.ratio) if power else 0.0))
     out = [
-        _record(r, channels, D, rho, max(apart), reference, scatter, shift)
+        _record(r, channels, D, rho, max(apart), reference, pair.rotor.likelier, shift, losses)
         for r, rho, reference in ((a, 1.0, True), (b, math.exp(log_ratio), False))
     ]
     known, test = out
@@ -207,7 +198,7 @@ def _in_reach(test: Record, known: Record) -> Record:
 
 def _record(
     run: StandRun, channels: dict[str, str], D: float, density: float, repeatability: float, reference: bool,
-    scatter: Mapping[str, Scatter], shift: Mapping[str, float],
+    scatter: Mapping[str, Scatter], shift: Mapping[str, float], losses: float,
 ) -> Record | None:  # fmt: skip
     points = run.points
     usual = {"rpm": _RPM, "density_kg_m3": np.nan, "airspeed_m_s": 0.0}
@@ -224,7 +215,7 @@ def _record(
     measured = {k: np.asarray(points[c] * unit[c], dtype=float) for k, c in channels.items()}
     if "torque_Nm" in measured:  # its sign is the sense of rotation
         measured["torque_Nm"] *= np.sign(np.nansum(measured["torque_Nm"])) or 1.0
-    u, zero = _errors({c: (k, measured[k], unit[c]) for k, c in channels.items()}, points, scatter, shift)
+    u, zero = _errors({c: (k, measured[k], unit[c]) for k, c in channels.items()}, points, scatter, shift, losses)
     good = np.isfinite(rpm) & (rpm > 0.0) & np.isfinite(rho)
     good &= np.any([np.isfinite(v) for v in measured.values()], axis=0)
     good &= rpm > _STARTED * float(np.max(rpm, where=good, initial=0.0))
@@ -256,7 +247,7 @@ def _record(
 
 def _errors(
     readings: Mapping[str, tuple[str, Array, Array | float]], points: Dataset, scatter: Mapping[str, Scatter],
-    shift: Mapping[str, float],
+    shift: Mapping[str, float], losses: float,
 ) -> tuple[dict[str, Array], dict[str, float]]:  # fmt: skip
     """Standard uncertainties of loads, and of their zeros; ``readings`` by channel with their unit."""
     u, zero = {}, {}
@@ -267,7 +258,7 @@ def _errors(
         if shift[c]:
             zero[k] = shift[c] * full
         if c == "electrical_power_W":  # a motor takes power without any load
-            u[k], zero[k] = np.hypot(u[k], EFFICIENCY * y), max(zero.get(k, 0.0), BY_POWER * full)
+            u[k], zero[k] = np.hypot(u[k], losses * y), max(zero.get(k, 0.0), SESSION["electrical"] * full)
     return u, zero
 
 

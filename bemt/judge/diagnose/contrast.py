@@ -176,7 +176,7 @@ def compare(
     refuse(faults)
     found = changed(runs[0], runs[1], math.nan if D is None else D)
     said = document(found)
-    if case is not None and not found.wind:
+    if case is not None and not (found.wind or found.without_speed):
         said = _diagnosed(said, asked, read, case, found, progress)
     if said.diagnosis is None:
         step: Mapping[str, Any] = next_step(found, asked)

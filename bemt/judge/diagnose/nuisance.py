@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.judge.compare.drive_laws import BY_LOAD, TOLD_VOLTAGE
-from bemt.judge.compare.matched import BY_POWER, SESSION
+from bemt.judge.compare.matched import SESSION
 from bemt.judge.compare.smooth_change import BEND
 from bemt.judge.diagnose.noise import law_of, smooth_modes
 from bemt.judge.diagnose.record import CHANNELS
@@ -118,7 +118,7 @@ def _of_stand(problem: Problem, add: Add) -> None:
             add(f"{name} zero{tag}", np.where(here & (problem.part == i), zero, 0.0))
             if c == 1 and p.record.electrical:
                 mine = here & (problem.part == i)
-                add(f"losses of the motor{tag}", np.where(mine, BY_POWER * y, 0.0), of_reading=True)
+                add(f"losses of the motor{tag}", np.where(mine, SESSION["electrical"] * y, 0.0), of_reading=True)
 
 
 def _of_flow_and_level(problem: Problem, add: Add) -> None:

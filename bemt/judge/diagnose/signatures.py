@@ -40,7 +40,7 @@ class Candidate:
     id: str  # Effect
     settings: tuple[Setting, ...]  # G settings of its parameters
     signatures: Array  # (M, G) Change of the readings for each [units of the readings]
-    weight: Array  # (G,) Prior probability of each setting, adds up to 1 [1]
+    weight: Array  # (G,) Prior probability of each setting, times the odds that files tell besides the readings [1]
     solved: NDArray[np.bool_]  # (G,) Whether the setting was solved rather than interpolated
     # Gives what the signature of an effect may be off by because of its law, (M, D) [units of the readings]
     directions: Callable[[Effect], Array] | None = None
@@ -58,7 +58,7 @@ class Candidate:
         if not keep.any():
             return None
         settings = tuple(s for s, k in zip(self.settings, keep, strict=True) if k)
-        weight = self.weight[keep] / self.weight[keep].sum()
+        weight = self.weight[keep] * (self.weight.sum() / self.weight[keep].sum())
         return Candidate(
             self.id, settings, self.signatures[:, keep], weight, self.solved[keep], self.directions
         )  # fmt: skip
