@@ -593,6 +593,8 @@ def rotor_of(given: Propeller | Case | str | os.PathLike[str]) -> Propeller:
         return propeller(text)
     except InputError as error:
         got, expected = "no folder or case of this name, and no label", "a case, its folder, or a label such as 10x5"
+        if text[:1].isdigit():
+            raise
         if fresh.looks_like_label(text):
             unread = [replace(f, got=f"{got}: {f.got}") for f in error.faults]
             raise InputError(unread) from None
