@@ -69,7 +69,7 @@ def _main_table(result: Result) -> str:
         body.append([
             row.label, f"{row.rpm:g}", f"{row.airspeed_m_s:g}", _kgf(row.thrust_kgf), _n(row.thrust_N),
             _u(row.u), _n(row.torque_Nm),
-            _n(row.CT), _n(row.CP), _n(co.FM(row.CT, row.CP, row.J), 3), _n(row.M_tip, 3), _n(row.Re, 3),
+            _n(row.CT), _n(row.CP), _n(co.FM(row.CT, row.CP, row.airspeed_m_s), 3), _n(row.M_tip, 3), _n(row.Re, 3),
             _pct(row.bemt_error_pct),
             _pct(row.k1k2_error_pct), _u_val(row), ",".join(marks),
         ])  # fmt: skip
