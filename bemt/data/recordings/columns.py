@@ -477,7 +477,8 @@ def merit_above_one(facts: Facts) -> Iterator[Finding]:
         elif ct is not None and cp is not None and (facts.J is not None or facts.airspeed_m_s is not None):
             J = facts.J if facts.J is not None else np.zeros(len(facts))
             ideal = ct * (0.5 * J + np.sqrt(0.25 * J**2 + 2.0 * np.maximum(ct, 0.0) / math.pi))
-            if facts.J is not None and (best := np.nanmax(np.where(cp > 0.0, ideal / cp, np.nan), initial=0.0)) < WORST:
+            best = np.nanmax(np.where(cp > 0.0, ideal / cp, np.nan), initial=0.0)  # 0: no row pulls
+            if facts.J is not None and 0.0 < best < WORST:
                 text = f"the power of an ideal rotor is {best:.2g} of it at most; of a real one, {WORST:g} and more"
                 fix = "10 K_Q taken for K_Q: multiply by 0.1; or the other convention of coefficients"
                 yield Finding(
