@@ -514,6 +514,7 @@ def test_turned_blades_of_the_quick_start_are_among_the_causes(
 @pytest.mark.parametrize(
     ("change", "case"),
     [
+        (scaled(thrust_N=1.12), None),
         (scaled(thrust_N=1.04, torque_Nm=1.04), None),
         (scaled(torque_Nm=1.3), "cases/prop_10x5"),
     ],

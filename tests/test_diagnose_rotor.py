@@ -52,7 +52,7 @@ def test_one_channel_in_another_unit_stays_a_finding_of_its_own() -> None:
     assert all(abs(share) <= 1.0 for share, _ in answer.off.values()) and abs(answer.where.size) <= 1.0
 
 
-@pytest.mark.parametrize("factor", [1 / 8.8507458, 0.2248])
+@pytest.mark.parametrize("factor", [1 / 8.8507458, 0.2248, 8.8507458])
 def test_a_coefficient_has_no_unit(factor: float, tmp_path: Path) -> None:
     """Off by the ratio of two units, it is still another rotor, to diagnose and to compare."""
     values = recording(case(), points("grid"), noise=0.005).derive(case().diameter_m).values

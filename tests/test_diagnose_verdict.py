@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -14,10 +15,12 @@ from interval_scales import Off, calibrate
 from bemt.judge import loss
 from bemt.judge.diagnose import chain, fit, form, knowledge, noise
 from bemt.judge.diagnose.assemble import build
+from bemt.judge.diagnose.folder import improved_case
 from bemt.judge.diagnose.record import from_series
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation, Size
 from bemt.physics import effects
 from bemt.physics.bem import model as bem
+from bemt.rotors.propeller import rotor_of
 
 
 @pytest.fixture(scope="module")
@@ -68,6 +71,9 @@ def test_a_duct_that_is_gone_is_a_cause_of_its_own() -> None:
     told = chain.diagnose([from_series(gone, fan), there], [fan])
     assert "duct" in told.decision.effects
     assert told.parameters["duct"]["state"].value == "gone"
+    improved = tomllib.loads(improved_case(told, fan, fan.path.read_text(encoding="utf-8")))["model"]
+    open_rotor = rotor_of(fan).replaced({"model.effects_on": improved["effects_on"]}).solve(20000.0, bands=False)
+    assert open_rotor.duct_thrust_N is None or not np.any(open_rotor.duct_thrust_N)
 
 
 def test_the_nearest_signature_is_a_baseline_of_its_own(answer: chain.Diagnosis) -> None:

@@ -319,7 +319,7 @@ def _crazyflie(build: Builder) -> Dataset:
 
 
 @dataclass(frozen=True)
-class Stand:
+class StandTable:
     """A reader of the tables of one stand."""
 
     KIND: str
@@ -345,10 +345,10 @@ class Stand:
         return self.finish(build)
 
 
-READERS: tuple[Reader | Stand, ...] = (
+READERS: tuple[Reader | StandTable, ...] = (
     Reader(JMAJEW, sniff_jmajew, read_jmajew),
     Reader(DRIVECALC, lambda head: first_cells(head) >= _PROPELLERS or first_cells(head) >= _POINTS, read_drivecalc),
-    Stand(
+    StandTable(
         "coaxial_stand", ({f"{what} {side}" for what in ("PWM", "Thrust", "Speed") for side in ("Left", "Right")},),
         {f"{what} {side.title()}": (f"{name}_{side}".lstrip("_"), unit)
          for what, (name, unit) in _COAXIAL_COLUMNS.items() for side in _SIDES} | {"Time": ("time", "s")},
@@ -356,7 +356,7 @@ READERS: tuple[Reader | Stand, ...] = (
               for side in _SIDES),
         _coaxial,
     ),
-    Stand(
+    StandTable(
         "crazyflie_bench", tuple({"pwm", "rpm1", "rpm2", "rpm3", "rpm4", load} for load in ("weight", "thrust")),
         {"pwm": ("throttle", "-"), "vbat": ("voltage", "V"), "v": ("supply_voltage", "V"),
          "i": ("supply_current", "A"), "p": ("supply_power", "W"), "weight": ("total_thrust", "gf"),

@@ -455,13 +455,15 @@ def power_lost(facts: Facts) -> Iterator[Finding]:
     yield Finding("power_lost", facts.named("electrical_power_W"), text, fix, (), "warning")
 
 
-WORST = 0.12
-"""Ideal over shaft power of the poorest rotor at its best: small ones in published tables reach 0.3 (declared) [1]."""
+_LEAST_MERIT = 0.12  # Figure of merit of the poorest rotor: small ones in published tables reach 0.3 (declared) [1]
 
 
 @check_for("merit")
 def merit_above_one(facts: Facts) -> Iterator[Finding]:
-    """A rotor in still air that needs less power than the ideal one (Froude; with a duct, an ideal one of 1.3 area)."""
+    """A rotor in still air that needs less power than the ideal one (Froude; with a duct, an ideal one of 1.3 area).
+
+    Or, where coefficients are given, many times as much: 10 K_Q is a usual column.
+    """
     limit, words = (math.sqrt(2.0 * 1.3), "a ducted one") if facts.ducted else (1.0, "an open one")
     ct, cp, cq = facts.CT, facts.CP, facts.get("CQ")
     cp = 2.0 * math.pi * cq if cp is None and cq is not None else cp
@@ -475,16 +477,13 @@ def merit_above_one(facts: Facts) -> Iterator[Finding]:
             area = math.pi / 4.0 * D * D
             fm = np.where((T > 0) & (P > 0), T**1.5 / (P * np.sqrt(2.0 * facts.rho * area)), np.nan)
         elif ct is not None and cp is not None and (facts.J is not None or facts.airspeed_m_s is not None):
-            J = facts.J if facts.J is not None else np.zeros(len(facts))
-            ideal = ct * (0.5 * J + np.sqrt(0.25 * J**2 + 2.0 * np.maximum(ct, 0.0) / math.pi))
-            best = np.nanmax(np.where(cp > 0.0, ideal / cp, np.nan), initial=0.0)  # 0: no row pulls
-            if facts.J is not None and 0.0 < best < WORST:
-                text = f"the power of an ideal rotor is {best:.2g} of it at most; of a real one, {WORST:g} and more"
-                fix = "10 K_Q taken for K_Q: multiply by 0.1; or the other convention of coefficients"
-                yield Finding(
-                    "coefficient_tenfold", facts.named("CP" if cq is None else "CQ"), text, fix, (), "warning"
-                )
             fm = np.where((ct > 0) & (cp > 0), np.asarray(co.FM(ct, cp), dtype=float), np.nan)
+            low = facts.loaded & facts.still & (fm < _LEAST_MERIT)
+            if enough(low, facts.loaded & facts.still):
+                text = f"figure of merit {np.max(fm[low]):.2g} at most; of a real rotor, {_LEAST_MERIT:g} and more"
+                fix = "10 K_Q taken for K_Q: multiply by 0.1; or the other convention of coefficients"
+                named = facts.named("CP" if cq is None else "CQ")
+                yield Finding("coefficient_tenfold", named, text, fix, rows_of(low), "warning")
         else:
             return
     odd = facts.loaded & facts.still & (fm > limit * 1.02)

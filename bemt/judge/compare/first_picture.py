@@ -334,11 +334,8 @@ def _ratio(axis: Any, change: RunChange, c: MatchedChannel) -> None:
     if r.density_ratio != 1.0:
         axis.axhline(r.density_ratio, color=_B, lw=1.0, ls="--", label="recorded density")
     if c.name not in OVER_COMMAND:
-        both = (
-            f"equal speed and {_advance(change)[0].partition(' [')[0]}"
-            if c.advance_moves()
-            else (f"equal {WITHOUT_SPEED.get(c.name, 'speed')}")
-        )
+        along = f" and {_advance(change)[0].partition(' [')[0]}" if c.advance_moves() else ""
+        both = f"equal {WITHOUT_SPEED.get(c.name, 'speed')}{along}"
         far = low > high + _STEADY
         axis.set_title("no common speed: extrapolated" if far else f"at {both}")
     axis.set_ylabel(f"{word}: B / A")
