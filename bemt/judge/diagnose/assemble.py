@@ -239,8 +239,11 @@ def _between(problem: Problem, joined: Sequence[Sequence[Record]], records: Sequ
     return tuple(f"{level.name}: {finding}" for level, finding in outlier_runs(levels))
 
 
-def assemble(parts: tuple[Part, ...], blade: CalibratedBlade = PLAIN) -> Problem:
-    """Stack the readings of parts and add the nuisances."""
+def assemble(parts: tuple[Part, ...], blade: CalibratedBlade = PLAIN, like: Problem | None = None) -> Problem:
+    """Stack the readings of parts and add the nuisances; `like`: one part that these readings go on from.
+
+    What goes on from others is as noisy as they are: computed readings beside them would look like scatter.
+    """
     full = [p.predict(p.baseline) for p in parts]
     y = np.concatenate([np.concatenate([p.record.measured[c] for c in p.channels]) for p in parts])
     u = np.concatenate([np.concatenate([p.record.u[c] for c in p.channels]) for p in parts])
@@ -265,9 +268,20 @@ def assemble(parts: tuple[Part, ...], blade: CalibratedBlade = PLAIN) -> Problem
         part[kept], kept, _covariates(parts), np.zeros((int(kept.sum()), 0)), (), np.zeros(0, dtype=bool), tuple(notes),
         blade=blade, offset=np.zeros(int(kept.sum())),
     )  # fmt: skip
-    problem = _with_noise(problem)
+    problem = _with_noise(problem) if like is None else _as_noisy(problem, like)
     columns, names, own, offset = nuisances(problem)
     return replace(problem, tangents=columns, names=names, own=own, offset=offset)
+
+
+def _as_noisy(problem: Problem, like: Problem) -> Problem:
+    """Uncertainty of the readings that come first as it is, of the others the same share."""
+    sigma = problem.u.copy()
+    for c in np.unique(problem.channel):
+        mine, known = problem.channel == c, like.channel == c
+        new = np.abs(problem.y[mine][np.count_nonzero(known) :])
+        share = np.median(like.u[known] / np.maximum(np.abs(like.y[known]), 1e-12))
+        sigma[mine] = np.concatenate([like.u[known], share * new])
+    return replace(problem, u=sigma, u_known=like.u_known, scatter=like.scatter)
 
 
 def _with_noise(problem: Problem) -> Problem:

@@ -158,6 +158,7 @@ def _candidate(problem: Problem, name: str, cls: type[Effect]) -> Candidate | No
     present = next((e for e in problem.baseline if e.id == name), None)
     given = cls().settings(problem.parts[0].flow)
     columns: list[_Column] = []
+    floor = 1e-3 * problem.u
     if given is not None:
         sizes = {p.name: p for p in cls.parameters if p.usual is not None}
         for setting in given:
@@ -174,8 +175,7 @@ def _candidate(problem: Problem, name: str, cls: type[Effect]) -> Candidate | No
             if present is None:
                 columns.append(({}, problem.signature((cls(),)), True, 1.0))
         else:
-            columns.extend(_grid(problem, cls, axes))
-    floor = 1e-3 * problem.u
+            columns.extend(_grid(problem, cls, axes, floor))
     lawful = [c for c in columns if all(cls(**c[0]).plausible(p.flow) for p in problem.parts if not p.record.reference)]
     kept = _merged([c for c in lawful if np.isfinite(c[1]).all()])
     if not any(np.any(np.abs(c[1]) > floor) for c in kept):
@@ -215,18 +215,23 @@ def _idle(name: str, columns: Sequence[_Column]) -> bool:
     return len(seen) < len(columns) and all(len(some) == 1 for some in seen.values())
 
 
-def _grid(problem: Problem, cls: type[Effect], axes: Sequence[Any]) -> Iterator[_Column]:
+def _grid(problem: Problem, cls: type[Effect], axes: Sequence[Any], floor: Array) -> Iterator[_Column]:
     """Solve at the nodes of all parameters and interpolate between them by cubic splines.
 
-    Where a parameter has a usual size, settings are denser about "off": equal steps of the inverse hyperbolic sine.
+    Nothing is solved between corners that all change the readings by less than the floor (M,). Where a parameter has a
+    usual size, settings are denser about "off": equal steps of the inverse hyperbolic sine.
     """
     from scipy.interpolate import CubicSpline
 
     nodes = [np.linspace(p.low, p.high, p.steps) for p in axes]
     names = [p.name for p in axes]
-    table = np.stack(
-        [problem.signature((cls(**dict(zip(names, map(float, v), strict=True))),)) for v in product(*nodes)], axis=-1
-    ).reshape(-1, *(n.size for n in nodes))
+
+    def solved_at(values: Sequence[float]) -> Array:
+        return problem.signature((cls(**dict(zip(names, map(float, values), strict=True))),))
+
+    if all(np.all(np.abs(solved_at(v)) <= floor) for v in product(*(n[[0, -1]] for n in nodes))):
+        return
+    table = np.stack([solved_at(v) for v in product(*nodes)], axis=-1).reshape(-1, *(n.size for n in nodes))
     if not np.isfinite(table).all():
         # where a corner does not converge, the nodes stand for themselves
         flat = table.reshape(table.shape[0], -1)

@@ -211,10 +211,7 @@ def _once_each(part: Part) -> NDArray[np.intp]:
 
 
 def _extended(alone: Problem, option: _Option) -> Problem:
-    """Plan with the option's points appended to a recording; readings are those of the baseline.
-
-    The noise stays as the readings have shown it: beside these the baseline's would look like scatter.
-    """
+    """Plan with the option's points appended to a recording; readings are those of the baseline."""
     (part,) = alone.parts
     old = part.record
     air_now = {k: float(np.median(getattr(old.air, k))) for k in ("rho", "mu", "a_sound", "temperature_K")}
@@ -235,14 +232,7 @@ def _extended(alone: Problem, option: _Option) -> Problem:
             filled[c] = join([old.measured[c], values[-option.rpm.size :]])
     u = {c: join([old.u[c], np.full(option.rpm.size, np.nan)]) for c in filled}
     record = Record(old.name, rpm, V, both, filled, u, extra, old.gain, old.zero, old.air_recorded)
-    plan = assemble((replace(part, record=record, flow=flow, _solved={}),))
-    sigma = plan.u.copy()
-    for c in np.unique(plan.channel):
-        mine, known = plan.channel == c, alone.channel == c
-        new = np.abs(plan.y[mine][np.count_nonzero(known) :])
-        share = np.median(alone.u[known] / np.maximum(np.abs(alone.y[known]), 1e-12))
-        sigma[mine] = join([alone.u[known], share * new])
-    return replace(plan, u=sigma)
+    return assemble((replace(part, record=record, flow=flow, _solved={}),), like=alone)
 
 
 def _of_cfd(found: Evidence) -> Suggestion:

@@ -68,7 +68,7 @@ _BOATTAIL = math.radians(18.0), math.radians(24.0)
 # Set on the torque of nozzle 19A at pitch 1.0, whose error then changes least with the load; no other pitch, no thrust.
 _UNSQUEEZED = 0.2
 
-# Steps in which the core of a swirling jet settles; each takes off most of what is left.
+# Steps at most in which the core of a swirling jet settles; each takes off most of what is left.
 _CORE_STEPS = 12
 
 # Turbulent skin friction of duct walls at Re of 1e5 to 1e7, Prandtl's 0.455/log10(Re)^2.58 between 0.007 and 0.003.
@@ -200,16 +200,18 @@ class DuctFlow:
         y_jet = m / (np.pi * rho * Vj)
         body = self.exit_hub**2 * np.pi * y_jet / (self.wake_ratio * self.area)
         edge, core = body + y_jet, np.maximum(body, 1e-6 * y_jet)
-        for last in (*([False] * _CORE_STEPS), True):
+        for step in range(_CORE_STEPS + 1):
             wide = edge - core
             slope = (tip2 - hub2) / wide
             foot = hub2 - core * slope
             ln = np.log(edge / core)
             E = 0.5 * (foot * ln / wide + slope - 1.0)
             P = 0.5 * (foot * (ln / wide - 1.0 / edge) + slope * (1.0 - core * ln / wide))
-            if not last:
-                gain = (s2_P * P - s2_E * E) / Vj**2
-                core = np.maximum(body, np.clip(gain, 1e-6, 0.5) * y_jet)
+            gain = (s2_P * P - s2_E * E) / Vj**2
+            found = np.maximum(body, np.clip(gain, 1e-6, 0.5) * y_jet)
+            if step == _CORE_STEPS or np.array_equal(found, core):
+                break
+            core = found
         suction = 0.5 * (foot * (1.0 / core - 1.0 / edge) + slope * ln)
         D = y_jet * s2_E * np.maximum(E, 0.0) + (core - body) * s2_P * suction
         return np.asarray(np.pi * rho * D)

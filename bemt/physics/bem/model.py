@@ -328,15 +328,15 @@ def respond(
     kept = {} if known is None or any(_has(e, "flow") for e in effects) else known
 
     def solution(some: Sequence[Effect], level: float) -> solver.Solution:
-        key = (tuple(e for e in some if acts_on_rotor(e)), level)
-        if key not in kept:
-            kept[key] = _solve(prepared(some, level), met)
-        return kept[key]
+        rotor = tuple(e.solved() for e in some if acts_on_rotor(e))
+        if (rotor, level) not in kept:
+            kept[rotor, level] = _solve(prepared(rotor, level), met)
+        return kept[rotor, level]
 
     base = solution(plain, 1.0)
     T, Q, T_duct, ok = base.T, base.Q, base.T_duct, base.converged
     for e, share in shared:
-        half, whole = (solution([*plain, e.solved()], level) for level in (0.5, 1.0))
+        half, whole = (solution([*plain, e], level) for level in (0.5, 1.0))
         w_half, w_whole = 4.0 * share * (1.0 - share), share * (2.0 * share - 1.0)
         T = T + w_half * (half.T - base.T) + w_whole * (whole.T - base.T)
         Q = Q + w_half * (half.Q - base.Q) + w_whole * (whole.Q - base.Q)

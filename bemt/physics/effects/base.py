@@ -537,7 +537,7 @@ class Effect:
         return None
 
     def solved(self) -> Effect:
-        """Effect whose solver hooks stand for this one's where :meth:`share` tells the rest; itself by default."""
+        """Effect whose solver hooks stand for this one's: `share` and `loads` tell the rest; itself by default."""
         return self
 
     def applies(self, flow: Flow) -> str:

@@ -48,6 +48,10 @@ class Nacelle(Effect):
         """Slow the axial flow, most at the root."""
         bake.Vx_factor = bake.Vx_factor * (1.0 - self.deficit * (1.0 + (bake.r / self._radius(bake)) ** 2) ** -1.5)
 
+    def solved(self) -> Nacelle:
+        """The body without its drag, which only the balance reads."""
+        return Nacelle(self.deficit, 0.0, self.body_over_R if self.deficit else 0.0)
+
     def loads(self, loads: Loads, flow: Flow) -> None:
         """Take the drag of the body off the thrust."""
         area = np.pi * self._radius(flow) ** 2

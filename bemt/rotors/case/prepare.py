@@ -33,6 +33,8 @@ from bemt.rotors.case.load import Assumption
 from bemt.rotors.model import with_run
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from bemt.physics.air import Air
     from bemt.physics.dataset import Dataset
     from bemt.rotors.case import Case
@@ -79,7 +81,6 @@ def _polars(case: Case, anchors: Sequence[tuple[float, Any]]) -> list[tuple[floa
 
 def _user_polars(case: Case, given: Sequence[PolarTable]) -> list[tuple[float, polars.Polar]]:
     """Read the tables of a case; several XFOIL files at one r/R are its Reynolds numbers."""
-    from bemt.data import readers as importers
     from bemt.data.readers.polars import read_many
 
     groups: dict[float, list[PolarTable]] = {}
@@ -92,7 +93,7 @@ def _user_polars(case: Case, given: Sequence[PolarTable]) -> list[tuple[float, p
         if len(items) > 1:
             out.append((x, read_many(paths)))
             continue
-        read = importers.read(paths[0], None if kind is None else f"polar_{kind}")
+        read = _table(paths[0], None if kind is None else f"polar_{kind}")
         if isinstance(read, polars.Polar):
             out.append((x, read))
         else:
@@ -100,6 +101,17 @@ def _user_polars(case: Case, given: Sequence[PolarTable]) -> list[tuple[float, p
             faults.append(Fault(paths[0].as_posix(), "", got, "a polar: CSV, XFOIL or C81"))
     refuse(faults)
     return out
+
+
+_TABLES: cache.Kept[Any] = cache.Kept(32, lambda _: 1.0)
+
+
+def _table(path: Path, kind: str | None) -> Any:
+    """Content of a file, read again only when it has changed."""
+    from bemt.data import readers as importers
+
+    held = path.read_bytes() if path.is_file() else None
+    return _TABLES.get((path.as_posix(), kind, held), lambda: importers.read(path, kind))
 
 
 def _duct_flow(case: Case, rotor: Rotor) -> DuctFlow | None:
