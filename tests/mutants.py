@@ -94,7 +94,7 @@ MUTANTS = (
     Mutant(f"{E}ground_effect.py", "np.arctan2(1.0, zeta) - zeta / (1.0 + zeta**2)", "np.arctan2(1.0, zeta)", PHYSICS),
     Mutant(f"{E}nacelle.py", "loads.T - self.cd * 0.5", "loads.T + self.cd * 0.5", PHYSICS),
     Mutant(f"{E}tip_gap.py", "bake.num.gap_loss = min(self.loss * gap", "bake.num.gap_loss = min(gap", GUARDS),
-    Mutant(f"{E}motor_heating.py", "b, r = 1.0 - MAGNET * warm", "b, r = 1.0 + MAGNET * warm", PHYSICS),
+    Mutant(f"{E}motor_heating.py", "b, r = 1.0 - MAGNET * self.rise_K", "b, r = 1.0 + MAGNET * self.rise_K", PHYSICS),
     Mutant(f"{E}battery_sag.py", "self.sag * power + self.discharge * charge", "self.sag * power", PHYSICS),
     Mutant(f"{E}recirculation.py", "flow.V + self.k * v", "flow.V - self.k * v", PHYSICS),
     # units, air, coefficients

@@ -615,6 +615,12 @@ def test_a_hot_motor_obeys_its_voltage_balance(copper: float) -> None:
     assert bool(hot < 1.0) is (copper > 0.3), "weaker magnets speed a lightly loaded motor up"
 
 
+def test_a_winding_that_is_hot_before_its_magnets_are_slows_the_motor_first() -> None:
+    flow = recorded([9000.0] * 3, time_s=np.array([0.0, 400.0, 1e7]))
+    cold, early, late = shown(flow, MotorHeating(60.0, 100.0, 0.1, magnets=10.0))["rpm"] / 9000.0
+    assert early < cold == 1.0 < late
+
+
 def test_a_motor_that_stands_cools_and_a_new_clock_starts_cold() -> None:
     t, run = np.array([0.0, 200.0, 400.0, 1e9, 2e9]), np.array([1.0, 1.0, 2.0, 3.0, 3.0])
     share = shown(recorded([9000.0] * 5, time_s=t, run=run), MotorHeating(60.0, 100.0, 0.05))["rpm"] / 9000.0 - 1.0

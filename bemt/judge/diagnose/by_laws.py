@@ -26,7 +26,7 @@ from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import knowledge, posterior, signatures
 from bemt.judge.diagnose.assemble import assemble
 from bemt.judge.diagnose.law_rotor import BLADE_LAWS, LAWS, VARIANTS, CoefficientCurve, LawRotor, Laws, law_part
-from bemt.judge.diagnose.record import Record, thinned
+from bemt.judge.diagnose.record import STILL, Record, thinned
 from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation
 from bemt.physics import effects
 from bemt.physics.air import Air
@@ -52,7 +52,7 @@ _COVARIATES = ("time_s", "temperature_K", "tip_gap_m", "wall_distance_m", "secon
 _RHO, _D, _RPM = 1.2, 0.25, 6000.0
 _FEWEST = 4
 # At rest a coefficient below this share of the usual one is no reading of a turning rotor.
-_NEAR_ZERO, _STILL = 0.15, 0.02
+_NEAR_ZERO = 0.15
 # Rows this many robust standard deviations off the curve through all of them are strays, and at least this share off.
 _FAR, _FAR_SHARE, _STRAYS = 5.0, 0.05, 0.1
 
@@ -222,7 +222,7 @@ def _record(
     for v in measured.values():
         size = np.abs(v) / (rho * n**2)
         usual = np.nanquantile(np.where(good, size, np.nan), 0.9)
-        v[(V <= _STILL * n * D) & ~(size > _NEAR_ZERO * usual)] = np.nan
+        v[(V <= STILL * n * D) & ~(size > _NEAR_ZERO * usual)] = np.nan
     good &= np.any([np.isfinite(v) for v in measured.values()], axis=0)
     if good.sum() < 2:
         return None

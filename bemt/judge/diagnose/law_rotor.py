@@ -17,7 +17,7 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.judge.diagnose.problem import BY_LAWS, Part
-from bemt.judge.diagnose.record import Record
+from bemt.judge.diagnose.record import STILL, Record
 from bemt.physics.effects.base import Effect, Flow, Loads
 
 # Where the reference has no airspeed: advance ratio of no thrust where CP/CT is not known, and the slope of thrust at
@@ -26,7 +26,6 @@ from bemt.physics.effects.base import Effect, Flow, Loads
 _NO_THRUST, _AT_REST, _ENDS = 0.65, (-2.4, 3.9), (-1.8, -0.05)
 # How far a coefficient may bend over J and over ln n, share of its largest value.
 _OVER_J, _OVER_SPEED = (3.0, 3.0, 2.0), (0.15, 0.1)
-_STILL = 0.02
 # Scatter of single rows for the fit of a curve, share of the row and of full scale.
 _ROW, _FLOOR = 0.01, 0.003
 # Bends of a recording that are followed: lengths over J and ln n, size over scatter, fewest points.
@@ -91,7 +90,7 @@ class CoefficientCurve:
         top = float(np.max(np.abs(c), initial=0.0)) or 1.0
         middle, half = 0.5 * float(x.max() + x.min()), 0.5 * float(np.ptp(x))
         span = float(np.ptp(J))
-        still = span <= _STILL
+        still = span <= STILL
         powers = 2 if still else min(3, np.unique(np.round(J, 2)).size - 1)
         last = max(float(J.max()), at_rest[2]) if still else float(J.max())
         out = cls(np.zeros(0), (float(J.min()), last), (middle, max(half, 1e-6)), powers)

@@ -22,8 +22,9 @@ from bemt.base.units import INCH
 from bemt.judge.diagnose.blade import AS_BUILT, LABELLED, AsLabelled
 from bemt.judge.diagnose.form import ALIKE
 from bemt.judge.diagnose.nuisance import blade_tangents
-from bemt.judge.diagnose.record import CHANNELS
+from bemt.judge.diagnose.record import CHANNELS, STILL
 from bemt.judge.explanation import DOUBT, Explanation
+from bemt.physics.coefficients import CP, CT, FM
 from bemt.physics.effects.base import Effect, RotorBuild
 from bemt.physics.effects.propeller import AnotherPropeller
 from bemt.rotors.as_measured import FACTOR
@@ -31,7 +32,7 @@ from bemt.rotors.as_measured import FACTOR
 if TYPE_CHECKING:
     from bemt.base.gaussian.whitening import Conditional
     from bemt.data.recordings.findings import Finding
-    from bemt.judge.diagnose.problem import Problem
+    from bemt.judge.diagnose.problem import Part, Problem
     from bemt.judge.loss import Decision
 
 UNREPEATABLE = 0.10
@@ -178,6 +179,8 @@ class Another:
         if problem.by_laws or np.any(problem.channel > 1) or not solved:
             return None
         size = _sizes(problem)
+        if not size.size:
+            return None
         base = np.tile(problem.f0, (size.size, 1))
         if any(np.any(p.flow.V != 0.0) for p in problem.parts):
             from scipy.interpolate import CubicSpline
@@ -221,14 +224,26 @@ class Another:
 def _sizes(problem: Problem) -> Array:
     """Logarithm of diameters over the case's: half inches from it, as propellers come, about as true as labels are.
 
-    In a duct there is room for one diameter.
+    In a duct there is room for one diameter. No open rotor needs less power at rest than an ideal one of its size.
     """
     part = next(p for p in problem.parts if not p.record.reference)
     D = 2.0 * part.flow.R
     steps = 1.0 + 0.5 * INCH / D * np.arange(-200.0, 201.0)
     sizes = np.log(steps[(steps > math.exp(-3.0 * _SIZES)) & (steps < math.exp(3.0 * _SIZES))])
-    sizes = np.zeros(1) if part.model.duct is not None else sizes
+    sizes = np.zeros(1) if part.model.duct is not None else sizes[np.exp(sizes) > _merit(part)]
     return np.sort((sizes[:, None] + _ROUNDED * np.array([-1.0, -0.5, 0.0, 0.5, 1.0])).ravel())
+
+
+def _merit(part: Part) -> float:
+    """Figure of merit at rest of a rotor of the case's diameter with these readings; 0 where they do not tell [1]."""
+    still, read = np.abs(part.flow.J) <= STILL, part.record.measured
+    if not np.any(still) or not {*CHANNELS[:2]} <= read.keys():
+        return 0.0
+    n, D = part.flow.n[still], 2.0 * part.flow.R
+    T, P = read[CHANNELS[0]][still], 2.0 * np.pi * n * read[CHANNELS[1]][still]
+    with np.errstate(invalid="ignore"):
+        found = FM(CT(T, part.flow.rho[still], n, D), CP(P, part.flow.rho[still], n, D))
+    return float(np.nanmedian(found)) if np.isfinite(found).any() else 0.0
 
 
 def _at_other_advance(problem: Problem, size: float) -> Array:

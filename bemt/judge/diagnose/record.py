@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 CHANNELS = ("thrust_N", "torque_Nm", "rpm")
 """Readings that may be explained; the speed only where a pulse width was recorded."""
+STILL = 0.02
+"""Advance ratio up to which a rotor is at rest: a draught is no wind [1]."""
 
 COVARIATES = (
     "time_s", "temperature_K", "pressure_Pa", "voltage_V", "current_A", "electrical_power_W", "pwm_s", "tip_gap_m",

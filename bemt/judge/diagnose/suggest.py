@@ -21,7 +21,7 @@ from bemt.judge.diagnose import noise
 from bemt.judge.diagnose.assemble import assemble
 from bemt.judge.diagnose.form import ALIKE
 from bemt.judge.diagnose.problem import Part, Problem
-from bemt.judge.diagnose.record import Record
+from bemt.judge.diagnose.record import STILL, Record
 from bemt.judge.diagnose.repeats import conditions
 from bemt.judge.diagnose.signatures import actual_unit, effect_of
 from bemt.judge.loss import minutes
@@ -48,8 +48,6 @@ ROTOR = (
 )
 """What comes before any cause where all loads are off by a quarter."""
 
-# Largest advance ratio of a recording up to which it is one at rest: a draught is no wind.
-_AT_REST = 0.02
 # Tip Mach number from which incompressible flow is some per cent off.
 _COMPRESSIBLE = 0.3
 # Loads of a run and its reference that differ by such a share may be of days of different density.
@@ -181,7 +179,7 @@ def _options(part: Part) -> list[_Option]:
         at("repeat the first points after 30 minutes of running", spread, static, None,
            time_s=now.get("time_s", 0.0) + 1800.0),
     ]  # fmt: skip
-    if top_J > _AT_REST:
+    if top_J > STILL:
         wind = np.linspace(0.2, 1.15 * J0, _POINTS) * middle / 60.0 * D
         out.append(at(f"runs in wind at {middle:.0f} rev/min, J 0.2 to {1.15 * J0:.2f}", same, wind))
     up = min(1.3, 0.85 / max(tip, 1e-6), record.top_rpm / high)
