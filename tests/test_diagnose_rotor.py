@@ -120,6 +120,18 @@ def test_density_moves_thrust_and_torque_by_the_same_share(plan: str, thrust: fl
     assert ("propeller" in answer.decision.effects) == (said == "propeller")
 
 
+def test_no_open_rotor_needs_less_power_than_an_ideal_one_of_its_size() -> None:
+    """Half of the torque at 1.6 times the thrust: a figure of merit of 1.9 of the case's size, of 1.0 of twice that."""
+    base = case()
+    plain = recording(base, points("static"), noise=0.0).values
+    better = {**plain, "thrust_N": 1.6 * plain["thrust_N"], "torque_Nm": 0.5 * plain["torque_Nm"]}
+    sizes = [
+        np.exp(other_rotor.Another.of(build([from_series(Dataset("bench", "log", values), base)], [base]))[1].size)
+        for values in (plain, better)
+    ]
+    assert sizes[0].min() < 0.9 < 1.5 < sizes[1].min() < sizes[1].max() == sizes[0].max()
+
+
 def test_a_rotor_that_is_the_case_is_not_asked_for() -> None:
     assert other_rotor.finding(build([from_series(recording(case(), points("grid")), case())], [case()])) == ""
 
