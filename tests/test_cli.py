@@ -16,6 +16,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import bemt as package
@@ -141,6 +142,17 @@ def test_help_shows_eight_options_at_most_and_help_all_every_one(
 def test_an_old_name_answers_and_names_the_new_one(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.parsed(["estimate", "10x5", "--rpm", "6000", "--airspeed", "5"])[1]["airspeed_m_s"] == [5.0]
     assert capsys.readouterr().err == "estimate: --airspeed is now --airspeed-m-s\n"
+
+
+def test_both_doors_take_a_quantity_in_another_unit_that_its_suffix_names() -> None:
+    for words in (["--airspeed-km-h", "18", "36"], ["--airspeed-km-h=18", "36", "--json"]):
+        given = cli.parsed(["estimate", "10x5", "--rpm", "6000", *words])[1]
+        assert given["airspeed_m_s"] == pytest.approx([5.0, 10.0], rel=1e-12) and given["rpm"] == [6000.0]
+    rotor = package.propeller("10x5")
+    other = rotor.solve(rpm=6000, airspeed_km_h=[18.0, 36.0])  # type: ignore[call-arg]
+    assert np.allclose(other.thrust_N, rotor.solve(rpm=6000, airspeed_m_s=[5.0, 10.0]).thrust_N, rtol=1e-12)
+    with pytest.raises(TypeError, match="airspeed_kg"):
+        rotor.solve(rpm=6000, airspeed_kg=3.0)  # type: ignore[call-arg]
 
 
 def test_a_wrong_keyword_is_answered_with_the_right_one() -> None:
