@@ -90,14 +90,15 @@ def _found(log: FlightLog) -> Vibration:
     rate = 1.0 / step
     nyquist = 0.5 * rate
     windows = _windows(log, t, step, _WINDOWS_S[0])
+    few = "under 3 s of samples" if len(windows) < _LEAST else ""
+    few = f"{rate:.0f} samples a second of the accelerometer" if nyquist < 2.0 * _LOW_HZ else few
+    rms = () if few else _rms(v, windows, step)
     if np.isfinite(shaft) and shaft > 0.97 * nyquist:
         why = (f"the shaft turns at {shaft:.0f} Hz and the {'accelerometer' if log.raw_unit == 'm/s2' else 'gyro'} has "
                f"{rate:.0f} samples a second, which show up to {0.97 * nyquist:.0f} Hz")  # fmt: skip
-        level = _rms(v, windows, step) if len(windows) >= _LEAST and nyquist >= 2.0 * _LOW_HZ else ()
-        return Vibration(rate, shaft, rms=level, unit=log.raw_unit, missing=why)
-    if len(windows) < _LEAST or nyquist < 2.0 * _LOW_HZ:
-        why = f"{rate:.0f} samples a second of the accelerometer" if nyquist < 2.0 * _LOW_HZ else "under 3 s of samples"
-        return Vibration(rate, shaft, unit=log.raw_unit, missing=f"{why} are too few")
+        return Vibration(rate, shaft, rms=rms, unit=log.raw_unit, missing=why)
+    if few:
+        return Vibration(rate, shaft, unit=log.raw_unit, missing=f"{few} are too few")
     f, power = _spectrum(v, windows, step)
     if speeds is None or not np.isfinite(shaft):
         mean = power.mean(axis=0)
@@ -107,7 +108,7 @@ def _found(log: FlightLog) -> Vibration:
         seen = double < mean.size - 3 * _SIDE
         twice_ = _line(mean, double - 2 * _SIDE, double + 2 * _SIDE) if seen else float("nan")
         return Vibration(rate, shaft, line_hz=float(f[peak]), line=_line(mean, peak - _SIDE, peak + _SIDE),
-                         twice=twice_, rms=_rms(v, windows, step), unit=log.raw_unit,
+                         twice=twice_, rms=rms, unit=log.raw_unit,
                          missing="which rotor shakes: log the speed of each")  # fmt: skip
     turns = np.stack([np.interp(t, log.t, s) for s in speeds.T], axis=1)
     span = np.array([[turns[w].min(), turns[w].max()] for w in windows]) / f[1]
@@ -115,7 +116,7 @@ def _found(log: FlightLog) -> Vibration:
                            for p, (low, high) in zip(power, span, strict=True)]))  # fmt: skip
     once, twice, why = _by_rotor(v, t, turns, [_windows(log, t, step, s) for s in _WINDOWS_S], total, rate / shaft)
     return Vibration(rate, shaft, once, twice, line_hz=shaft, line=float(np.sqrt(total)), unit=log.raw_unit,
-                     rms=_rms(v, windows, step), missing=f"which rotor shakes: {why}" if why else "")  # fmt: skip
+                     rms=rms, missing=f"which rotor shakes: {why}" if why else "")  # fmt: skip
 
 
 def _rms(v: Array, windows: list[slice], step: float) -> tuple[float, ...]:
