@@ -22,10 +22,12 @@ NAMES = ("motor.m1(H)", "motor.m2(H)", "motor.m3(H)", "motor.m4(H)", "rpm.m1(H)"
          "acc.x(f)", "acc.y(f)", "acc.z(f)", "pm.vbatMV(H)")  # fmt: skip
 
 
-def flight(seed: int, strength: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0), mass: float = MASS) -> bytes:
-    """One flight of 12 s at 250 Hz as the bytes of a log."""
+def flight(
+    seed: int, strength: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0), mass: float = MASS, seconds: float = 12.0
+) -> bytes:
+    """One flight at 250 Hz as the bytes of a log."""
     rng = np.random.default_rng(seed)
-    t = np.arange(0.0, 12.0, 0.004)
+    t = np.arange(0.0, seconds, 0.004)
     z = 1.0 + 0.5 * np.cos(0.5 * np.pi * t)
     vz = np.gradient(z, t)
     up = G + np.gradient(vz, t)
@@ -35,7 +37,7 @@ def flight(seed: int, strength: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0), mass: 
     thrust = mass * up[:, None] * np.linalg.solve(moments, loads)
     k = K * np.array(strength) * (1.0 - 0.04 * vz[:, None])
     rpm = np.sqrt(thrust / k) * (1.0 + 0.002 * rng.normal(size=thrust.shape))
-    volts = 3.9 - 0.03 * t
+    volts = 3.9 - 0.03 * np.minimum(t, 12.0)
     command = 65535.0 * rpm / (7500.0 * volts[:, None])
     noise = 0.02 * rng.normal(size=(t.size, 3))
     head = struct.pack("<BHHH", 0xBC, 2, 1, 1) + b"fixedFrequency\0" + struct.pack("<H", len(NAMES))

@@ -22,7 +22,7 @@ from bemt.tools.flight.answer import FlightAnswer, answer_on
 from bemt.tools.flight.balance import BUILD, axes_of, blade, features
 from bemt.tools.flight.change import change_in
 from bemt.tools.flight.identify import identify
-from bemt.tools.flight.judge import FlightVerdict, judge, posterior
+from bemt.tools.flight.judge import BesideBalance, FlightVerdict, judge, posterior
 from bemt.tools.flight.layout import LAYOUTS, effect_matrix, layout_of, mass_faults
 from bemt.tools.flight.log import FlightLog
 from bemt.tools.flight.picture import flight_picture
@@ -30,6 +30,7 @@ from bemt.tools.flight.read import read_log
 from bemt.tools.flight.speed_sensor import checked
 from bemt.tools.flight.text import text
 from bemt.tools.flight.thrust_curve import inflow, motor_lag, simulator_constants
+from bemt.tools.flight.vibration import vibration
 from bemt.tools.flight.wind import wind
 
 
@@ -254,13 +255,14 @@ def test_damaged_copies_never_raise_anything_else(count: int, flights: Path, tmp
     assert 0 < broken_copies(samples, count, tmp_path / "log") < count
 
 
-@pytest.mark.parametrize("count", [30, pytest.param(500, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [30, pytest.param(900, marks=pytest.mark.slow)])
 def test_damaged_recordings_never_raise_anything_else(count: int, shared_data: Path, tmp_path: Path) -> None:
-    """The formats that libraries read."""
+    """The formats that libraries read, a packed one, and logs of both makers of a Crazyflie's."""
     pytest.importorskip("pyulog")
     pytest.importorskip("pymavlink")
     folder = shared_data / "flight_logs"
-    samples = [p.read_bytes() for p in (*sorted(folder.glob("*.ulg")), *folder.glob("*.BIN"))]
+    names = ("*.ulg", "*.BIN", "udesa*.gz", "crazypad_E8/normal*01.usdlog", "crazypad*.csv", "imrc/*jana20.usdlog")
+    samples = [p.read_bytes() for name in names for p in sorted(folder.glob(name))]
     broken_copies(samples, count, tmp_path / "log")
 
 
@@ -375,17 +377,28 @@ THREE_MM = ("cut_propeller_M3_3mm", "cut_propeller_M3_1.5mm_", "cut_propeller_M3
 
 
 @pytest.fixture(scope="module")
-def cut(shared_data: Path) -> dict[str, dict[str, FlightVerdict]]:
-    """CrazyPAD E8 by its healthy flights, with the day open and stated."""
-    folder, layout = shared_data / "flight_logs" / "crazypad_E8", layout_of("crazyflie", 4)
-    read = {p.stem: x for p in sorted(folder.glob("*")) if (x := features(read_log(p))) is not None}
-    calm = [x for name, x in read.items() if name.startswith("normal")]
-    return {day: {name: judge(x, calm, layout, day=0 if day else "") for name, x in read.items()}
-            for day in ("", "same")}  # fmt: skip
+def flown(shared_data: Path) -> dict[str, tuple[np.ndarray, float]]:
+    """Features and levels of vibration of CrazyPAD E8."""
+    logs = {p.stem: read_log(p) for p in sorted((shared_data / "flight_logs" / "crazypad_E8").glob("*"))}
+    return {name: (x, vibration(log).level) for name, log in logs.items() if (x := features(log)) is not None}
+
+
+def by_healthy(flown: dict[str, tuple[np.ndarray, float]], name: str, day: str, shakes: bool = True) -> FlightVerdict:
+    """One of these by the healthy ones."""
+    x, level = flown[name]
+    calm, levels = zip(*(v for k, v in flown.items() if k.startswith("normal")), strict=True)
+    beside = BesideBalance(level=level, levels=levels) if shakes else None
+    return judge(x, calm, layout_of("crazyflie", 4), beside=beside, day=0 if day else "")
+
+
+@pytest.fixture(scope="module")
+def cut(flown: dict[str, tuple[np.ndarray, float]]) -> dict[str, dict[str, FlightVerdict]]:
+    """All by the healthy flights, with the day open and stated."""
+    return {day: {name: by_healthy(flown, name, day) for name in flown} for day in ("", "same")}
 
 
 def test_recorded_quadrotor_with_cut_blades(cut: dict[str, dict[str, FlightVerdict]]) -> None:
-    """No sound flight accused, never another motor's blade; by flights of the day motor 3 in 7 of 10 or more."""
+    """No sound flight accused, never another motor's blade; by flights of the day motor 3 in 8 of 10 or more."""
     for day, answers in cut.items():
         for name, got in answers.items():
             assert got.accused == 0
@@ -393,13 +406,18 @@ def test_recorded_quadrotor_with_cut_blades(cut: dict[str, dict[str, FlightVerdi
             assert name.startswith("cut") or got.said.verdict == ("insufficient" if weighed else "none"), name
             assert not got.said.effects or got.said.effects[0] == "damaged blade, motor 3", name
         large = [got for name, got in answers.items() if name.startswith(THREE_MM)]
-        assert sum(bool(got.said.effects) for got in large) >= (7 if day else 5)
+        assert sum(bool(got.said.effects) for got in large) >= (8 if day else 5)
 
 
-def test_a_cause_that_is_likely_but_not_sure_is_said_to_be(cut: dict[str, dict[str, FlightVerdict]]) -> None:
-    """No rival is made up, the day is asked for where it is open, and the likely motor is the first to be looked at."""
-    for day, answers in cut.items():
-        got = answers["cut_propeller_M3_3mm__log01"]
+def test_a_cause_that_is_likely_but_not_sure_is_said_to_be(flown: dict[str, tuple[np.ndarray, float]]) -> None:
+    """No rival is made up, the day is asked for where it is open, and the likely motor is the first to be looked at.
+
+    By the balance alone; that the flight shakes three times as much as the healthy ones makes it sure.
+    """
+    name = "cut_propeller_M3_3mm__log01"
+    assert by_healthy(flown, name, "same").said.effects == ("damaged blade, motor 3",)
+    for day in ("", "same"):
+        got = by_healthy(flown, name, day, shakes=False)
         assert got.said.verdict == "insufficient" and got.probability[got.said.leading] > 0.5
         assert "several" not in got.said.why and "motor 3" in got.said.why and "motor 3" in got.next.text
         assert ("--healthy-day" in got.next.text) == (not day)
@@ -411,11 +429,10 @@ def test_recorded_weights_on_a_string_are_none(cut: dict[str, dict[str, FlightVe
     assert all(got.said.verdict == "none" for name, got in cut[""].items() if not name.startswith("cut"))
 
 
-@pytest.mark.xfail(strict=True, reason="3 mm off one blade: probability 0.85 and 0.5 to 0.65, and a claim costs more")
-@pytest.mark.parametrize("day", ["", "same"])
-def test_recorded_cuts_from_3_mm_on(cut: dict[str, dict[str, FlightVerdict]], day: str) -> None:
+@pytest.mark.xfail(strict=True, reason="another day is as likely beforehand: 0.75 to 0.85, and a claim costs more")
+def test_recorded_cuts_from_3_mm_on_with_the_day_open(cut: dict[str, dict[str, FlightVerdict]]) -> None:
     """Motor 3 in 8 of 10 or more."""
-    assert sum(bool(got.said.effects) for name, got in cut[day].items() if name.startswith(THREE_MM)) >= 8
+    assert sum(bool(got.said.effects) for name, got in cut[""].items() if name.startswith(THREE_MM)) >= 8
 
 
 def test_recorded_cuts_moved_to_two_motors(shared_data: Path) -> None:
@@ -509,6 +526,27 @@ def test_recorded_wind(shared_data: Path, name: str, speed: float) -> None:
     got = answered(folder, f"baseline_{name}.csv.gz", healthy=[read_log(folder / "baseline_nowind.csv.gz")]).wind
     assert abs(got.speed - speed) < got.half
     assert abs(got.speed - speed) < 2.0
+
+
+def test_recorded_wind_by_the_drag_of_the_other_flights(shared_data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each left out: 60 to 80 % of thirds of flights in one standard deviation, 90 % in two; bias 0.7 m/s at most."""
+    known = {"35wind": (4.2, 0.128), "70wind": (8.5, 0.044), "70p20sint": (8.5, 0.060), "100wind": (12.1, 0.078)}
+    logs = {
+        k: read_log(shared_data / "flight_logs" / "neural_fly" / f"baseline_{k}.csv.gz") for k in [*known, "nowind"]
+    }
+    miss, z = [], []
+    for k, (speed, _) in known.items():
+        others = [share for j, (_, share) in known.items() if j != k]  # r of each by its wind, as wind.py has it
+        monkeypatch.setattr("bemt.tools.flight.wind._SHARE", float(np.exp(np.mean(np.log(others)))))
+        log = logs[k]
+        miss.append(wind(log, [logs["nowind"]]).speed - speed)
+        assert log.velocity is not None and log.axis is not None
+        for rows in np.array_split(np.arange(log.t.size), 3):
+            third = FlightLog("f", "made", log.t[rows], velocity=log.velocity[rows], axis=log.axis[rows])
+            got = wind(third, [logs["nowind"]])
+            z.append(1.96 * abs(got.speed - speed) / got.half)
+    assert 0.6 <= np.mean(np.array(z) < 1.0) <= 0.8 and np.mean(np.array(z) < 1.96) >= 0.9
+    assert abs(np.mean(miss)) <= 0.7 and max(np.abs(miss)) < 1.0
 
 
 def test_recorded_calm_is_calm(shared_data: Path) -> None:

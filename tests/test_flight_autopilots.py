@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import runpy
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +13,11 @@ from flight_files import Hover, broken_copies, dataflash, ulog
 
 from bemt.app.cli import main
 from bemt.base.errors import InputError
+from bemt.judge.explanation import Explanation
 from bemt.tools.flight import log as flight_log
 from bemt.tools.flight.answer import FlightAnswer, answer_on
 from bemt.tools.flight.change import change_in
-from bemt.tools.flight.judge import judge
+from bemt.tools.flight.judge import BesideBalance, judge, posterior
 from bemt.tools.flight.layout import LAYOUTS, effect_matrix, layout_of
 from bemt.tools.flight.log import FlightLog
 from bemt.tools.flight.read import read_log
@@ -156,6 +160,17 @@ def test_rotor_that_shakes(kind: str, more: dict[str, object], tmp_path: Path) -
     assert answer_on(calm[0], calm[1:]).judged.said.verdict == "none"
 
 
+@pytest.mark.parametrize("beside", [BesideBalance(shaken=(0,)), BesideBalance(level=1.2, levels=(0.1, 0.0, 0.1, 0.0))])
+def test_a_shake_of_no_known_rotor_is_a_sign_of_the_one_that_lost_thrust(beside: BesideBalance) -> None:
+    """It makes the blade that the balance points to likelier, and a weight less so."""
+    layout = layout_of("quad-x", 4)
+    calm = 0.01 * np.random.default_rng(1).normal(size=(4, 4))
+    x = calm.mean(axis=0) + 0.2 * np.eye(4)[2]
+    alone, both = (posterior(x, calm, layout, beside=b).P for b in (None, beside))
+    cut, weight = Explanation.of("damaged blade, motor 3"), Explanation.of("weight near motor 3")
+    assert both[cut] > alone[cut] and both[cut] / both[weight] > 2.0 * alone[cut] / alone[weight]
+
+
 def test_too_slow_for_vibration(tmp_path: Path) -> None:
     """The rate that would show it is said."""
     got = answer_on(read(tmp_path, "ardupilot", Hover(seconds=12.0)))
@@ -230,6 +245,27 @@ def test_cut_copies_are_read_as_far_as_they_go(tmp_path: Path) -> None:
         (tmp_path / "log").write_bytes(data[:40_000] + bytes([7]) * 50 + data[40_050:])
         log = read_log(tmp_path / "log")
         assert "damaged" in log.ends and log.t[-1] > 11.0
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="only Linux tells the most memory there")
+@pytest.mark.parametrize("kind", ["ardupilot", "px4", "crazyflie"])
+def test_a_log_of_100_MB_is_answered_in_10_s_and_500_MB(kind: str, project: Path, tmp_path: Path) -> None:
+    """By a command of its own: processor time and the most memory that it held."""
+    make = {
+        "ardupilot": lambda s: dataflash(Hover(seconds=s), imu_hz=1e3),
+        "px4": lambda s: ulog(Hover(seconds=s), imu_hz=1e3, fifo=True),
+        "crazyflie": lambda s: runpy.run_path(str(project / "docs" / "flight_log.py"))["flight"](1, seconds=s),
+    }[kind]
+    (tmp_path / "log").write_bytes(make(20.0 * 1e8 / len(make(20.0))))
+    code = (  # ru_maxrss is no less than that of the process that started it
+        "import re, sys, time; from bemt.app.cli import main; assert main(sys.argv[1:]) == 0; "
+        "print(time.process_time(), int(re.search(r'VmHWM:\\s+(\\d+)', open('/proc/self/status').read())[1]) / 1024.0)"
+    )
+    words = [sys.executable, "-c", code, "fly", str(tmp_path / "log"), "--quiet"]
+    run = subprocess.run(words, capture_output=True, text=True, check=True)
+    seconds, megabytes = map(float, run.stdout.split()[-2:])
+    assert seconds < 10.0 and megabytes < 500.0, (seconds, megabytes)
 
 
 @pytest.mark.parametrize("count", [20, pytest.param(600, marks=pytest.mark.slow)])

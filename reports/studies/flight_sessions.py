@@ -3,7 +3,8 @@
 ``python reports/studies/flight_sessions.py DATA > reports/flight/sessions.txt`` takes DATA/flight_logs (10 s). The six
 normal flights of CrazyPAD E8 are three sessions by their balance: 00 and 01, 02 to 04, 05; those of E9 are one, and
 the cuts of its motors 1 and 2 of another day. Every choice of sessions, with two flights or more, judges all other
-recordings, and the normal flights left out with a rotor that needs 8 to 40 % more drive, as a rigid body balances it.
+recordings, and the normal flights left out with a rotor that needs 8 to 40 % more drive, as a rigid body balances it
+(their vibration is not counted: nobody knows it).
 """
 
 from __future__ import annotations
@@ -19,9 +20,10 @@ import numpy as np
 from scipy import stats
 
 from bemt.tools.flight.balance import WEIGHT, blade, directions, features
-from bemt.tools.flight.judge import posterior
+from bemt.tools.flight.judge import BesideBalance, posterior
 from bemt.tools.flight.layout import layout_of
 from bemt.tools.flight.read import read_log
+from bemt.tools.flight.vibration import vibration
 
 SESSIONS = {"E8": ("0[01]", "0[234]", "05"), "E9": ("0[012]",)}  # numbers of the normal flights
 SIZES = (0.08, 0.12, 0.2, 0.3, 0.4)
@@ -39,7 +41,9 @@ def trials(folder: Path) -> Iterator[tuple[str, str, str]]:
     layout = layout_of("crazyflie", 4)
     for vehicle, sessions in SESSIONS.items():
         files = sorted(p for p in folder.rglob("*.usdlog") if f"{vehicle}/" in str(p) or f"{vehicle}_normal" in p.name)
-        flown = {p.stem: x for p in files if (x := features(read_log(p))) is not None}
+        logs = {p.stem: read_log(p) for p in files}
+        flown = {k: x for k, log in logs.items() if (x := features(log)) is not None}
+        level = {k: vibration(logs[k]).level for k in flown}
         days = [{k for k in flown if re.search(f"normal.*log{n}$", k)} for n in sessions]
         for used in (u for n in range(1, len(days) + 1) for u in combinations(range(len(days)), n)):
             past = [k for d in used for k in sorted(days[d])]
@@ -57,8 +61,10 @@ def trials(folder: Path) -> Iterator[tuple[str, str, str]]:
                 )
             }
             told = {k: ("recorded", faults(k), x) for k, x in flown.items() if k not in past}
+            levels = tuple(level[k] for k in past)
             for (what, (kind, wrong, x)), day in product((told | made).items(), ("", None)) if len(past) > 1 else ():
-                said = posterior(x, np.array([flown[k] for k in past]), layout, days=label, day=day).said
+                shake = BesideBalance(level=level.get(what, np.nan), levels=levels)
+                said = posterior(x, np.array([flown[k] for k in past]), layout, False, shake, label, day).said
                 hit = "right" if wrong and wrong <= set(said.effects) else "wrong"
                 end = f"{said.verdict} {hit}" if said.effects else said.verdict
                 end = "accused" if not wrong and end not in ("none", "insufficient") else end

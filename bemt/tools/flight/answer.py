@@ -71,6 +71,7 @@ class FlightAnswer:
     # At the frequencies of the rotors
     vibration: Vibration = field(default_factory=Vibration)
     shaken: tuple[tuple[int, float, bool], ...] = ()  # As :func:`bemt.tools.flight.vibration.shaken` gives it
+    louder: float = float("nan")  # Level of vibration over the mean of the healthy flights' [1]
     speeds: tuple[tuple[int, float], ...] = ()  # As :func:`bemt.tools.flight.speed_sensor.speed_changes` gives it
     inflow: Inflow | None = None  # Thrust over the flow
     mass: Constant | None = None  # Mass from healthy flights of known mass [kg]
@@ -121,7 +122,7 @@ class FlightAnswer:
             "share_change": j.readings.tolist(),
             "total_change": j.total,
             "change_in_flight": None if self.change is None else asdict(self.change),
-            "vibration": asdict(self.vibration),
+            "vibration": asdict(self.vibration), "vibration_over_healthy": self.louder,
             "shaken": [{"motor": k + 1, "ratio": r, "against_healthy": h} for k, r, h in self.shaken],
             "speed_at_drive": [{"motor": k + 1, "change": c} for k, c in self.speeds],
             "inflow": None if flow is None else {"axial": flow.axial, "axial_m_s": flow.axial_m_s,
@@ -162,6 +163,8 @@ def answer_on(
     placed = layout_of(log.layout, log.rotors) if log.rotors else None
     found, air, mine = identify(log, mass_kg), wind(log, healthy), features(log)
     shake, calm = vibration(log), [vibration(h) for h in healthy]
+    levels = np.array([v.level if shake.alike(v) else np.nan for v in calm])
+    past = levels[np.isfinite(levels)]
     moved, turned = shaken(shake, calm), speed_changes(log, healthy)
     changed, days = change_in(log, placed), sessions(log, healthy, stated_days, day)
     mass = _by_healthy(log, found, healthy, healthy_mass_kg)
@@ -176,6 +179,7 @@ def answer_on(
         beside = BesideBalance(
             tuple(k + 1 for k, part in turned if part > 0.0), tuple(k + 1 for k, part in turned if part < 0.0),
             tuple(k + 1 for k, _, known in moved if known), changed, tuple(upset),
+            shake.level, tuple(levels[k] for k, _ in flown),
         )  # fmt: skip
         mine, *others = at_equal_voltage([log, *(healthy[k] for k, _ in flown)], [mine, *(x for _, x in flown)])
         judged = judge(mine, others, placed, _windy(log, healthy, air), beside,
@@ -188,7 +192,8 @@ def answer_on(
         if placed is not None:
             balance = tuple(2.0 * float(r) for r in axes_of(placed, log.rotors) @ usual)
     return FlightAnswer(
-        log, found, judged, air, balance, drives, _limited(log), changed, shake, moved, turned, inflow(log), mass,
+        log, found, judged, air, balance, drives, _limited(log), changed, shake, moved,
+        float(np.exp(shake.level - past.mean())) if past.size else float("nan"), turned, inflow(log), mass,
         simulator=simulator_constants(log, found), curve=thrust_curve(log), days=days, demand=_demand(log),
     )  # fmt: skip
 

@@ -95,5 +95,7 @@ def from_columns(name: str, kind: str, columns: dict[str, tuple[Array, Array]], 
         "voltage": one("pm.vbatMV", 1e-3) or one("pm.vbat", 1.0), "thrust": thrust, "torque": demand,
     }  # fmt: skip
     main = "command" if command else "rpm"
-    raw = many(*acc, factor=G0, whole=True)
+    # The estimator's is the accelerometer's reading turned into axes of the world, less 1 g (kalman_core.c).
+    turned = [f"stateEstimate.a{a}" for a in "xyz"]
+    raw = many(*acc, factor=G0, whole=True) or many(*turned, factor=G0, whole=True)
     return joined(name, kind, sources, main, raw=raw, layout="crazyflie", ends=ends, mixed=said, duty=duty)

@@ -42,6 +42,7 @@ from bemt.tools.flight.balance import (
     healthy_flight,
 )
 from bemt.tools.flight.change import FlightChange, FlightEvidence, FlightReadings
+from bemt.tools.flight.vibration import level_odds
 
 ELSEWHERE = (DAY, BUILD, WIDE)
 """Explanations that say nothing of a fault: the healthy flights are of another day, or the vehicle is of its own."""
@@ -64,6 +65,9 @@ class BesideBalance:
     shaken: tuple[int, ...] = ()
     change: FlightChange | None = None  # A change of the balance within the flight
     healthy: tuple[bool, ...] = ()  # Of each healthy flight, whether a rotor shakes or the balance changes within it
+    # Log of the level of vibration, and of each healthy flight where it is of the same kind [1]
+    level: float = float("nan")
+    levels: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,11 +136,13 @@ def judge(
     if n < 3:
         return out
     bad, several = [], np.unique(label).size > 1
+    levels = np.array(beside.levels) if len(beside.levels) == n else np.full(n, np.nan)
     for k, h in enumerate(calm):
         # Of several sessions each is left out; of one, each flight, and its day is as open as that of this one.
         keep = label != label[k] if several else np.arange(n) != k
         left_out = None if several else "" if isinstance(day, str) else int(label[k])
-        other = posterior(h, calm[keep], layout, days=label[keep], day=left_out).said
+        shake = BesideBalance(level=levels[k], levels=tuple(levels[keep]))
+        other = posterior(h, calm[keep], layout, False, shake, label[keep], left_out).said
         bad.append(any(beside.healthy[k : k + 1]) or other.verdict in (*CLAIMS, "unknown"))
     interval = stats.binomtest(sum(bad), len(bad)).proportion_ci(method="exact")
     return replace(out, accused=sum(bad), healthy=len(bad), rate95=(float(interval.low), float(interval.high)),
@@ -319,13 +325,17 @@ def _as_blade(cause: str) -> str:
 def _factors(of: Sequence[Explanation], beside: BesideBalance) -> dict[Explanation, float]:
     """Logarithm of how likely what else the log shows is under each explanation, less a factor of all.
 
-    A flag is raised for no reason in ALARM of the flights, and by the fault that it is a sign of in half of them.
+    A flag is raised for no reason in ALARM of the flights, and by the fault that it is a sign of in half of them. Where
+    none is raised for a shake, the level of vibration counts: a weight leaves it, all else may raise it.
     """
     out = dict.fromkeys(of, 0.0)
+    level = 0.0 if beside.shaken else level_odds(beside.level, beside.levels, _SEEN)
     flags = [{blade(k)} for k in beside.faster] + [{WEAK + str(k)} for k in beside.slower]
-    flags += [{_shaking(k), _worn(k)} for k in beside.shaken]
+    blades = {i for e in of for i in e if i.startswith(BLADE)}  # each may be the rotor that is not known
+    flags += [{_shaking(k), _worn(k)} | (set() if k else blades) for k in beside.shaken]
     for e in out:
         out[e] = sum(float(np.log(_SEEN if signs & e.ids else ALARM)) for signs in flags)
+        out[e] += level if e == UNKNOWN or any(not i.startswith(WEIGHT) for i in e) else 0.0
         if beside.change is not None:
             odds = dict(zip(beside.change.causes, beside.change.odds, strict=True))
             out[e] += max((odds[i] for i in e if i in odds), default=0.0)

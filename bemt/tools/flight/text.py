@@ -191,12 +191,16 @@ def _level(shake: Vibration) -> str:
     total = float(np.linalg.norm(shake.rms))
     known = np.isfinite(shake.shaft_hz)
     what = "once a turn" if known else "likely once a turn; no speed was logged to know"
-    at = f"{shake.line_hz:.0f} Hz ({what})"
-    # The line is an amplitude, the others root mean squares.
-    most = shake.line**2 / 2.0 > 0.5 * total**2
-    where = f"most of it at {at}, as a rotor out of balance shakes" if most else f"strongest at {at}"
+    where = ""
+    if _stands_out(shake):
+        where = f", most of it at {shake.line_hz:.0f} Hz ({what}), as a rotor out of balance shakes"
     high = "high: " if total > _HIGH else ""
-    return f"Vibration {high}{total:.2g} m/s2 above 20 Hz, {where}."
+    return f"Vibration {high}{total:.2g} m/s2 above 20 Hz{where}."
+
+
+def _stands_out(shake: Vibration) -> bool:
+    """Whether one line holds most of the vibration; it is an amplitude, the others are root mean squares."""
+    return shake.line**2 / 2.0 > 0.5 * float(np.sum(np.square(shake.rms)))
 
 
 def _seen(a: FlightAnswer) -> list[str]:
@@ -269,7 +273,7 @@ def _heard(a: FlightAnswer) -> list[str]:
     if once:
         lines = [f"Vibration once a turn ({shake.shaft_hz:.0f} Hz): {once} {shake.unit}."]
         return lines + ([f"Vibration twice a turn: {twice} {shake.unit}."] if twice else [])
-    if not np.isfinite(shake.line):
+    if not np.isfinite(shake.line) or not (known or _stands_out(shake)):
         return []
     seen = f"found in the spectrum: once a turn at {60 * shake.line_hz:.0f} rev/min, if so"
     where = "once a turn" if known else seen
@@ -284,7 +288,8 @@ def _along_axes(a: FlightAnswer) -> list[str]:
         return []
     said = "as the autopilot states it (VIBE)" if shake.stated else "above 20 Hz"
     each = ", ".join(f"{v:.2g}" for v in shake.rms)
-    return [f"Vibration {said}: {each} {shake.unit} in x, y, z (root mean square)."]
+    more = f", in all {a.louder:.1f} times that of the healthy flights" if np.isfinite(a.louder) else ""
+    return [f"Vibration {said}: {each} {shake.unit} in x, y, z (root mean square){more}."]
 
 
 def _blown(a: FlightAnswer) -> list[str]:

@@ -7,6 +7,9 @@ checked there). Rotors whose angles stay together over a window cannot be told a
 were not good enough to follow the phase holds less than the spectrum's line: both are left out.
 
 Without speeds the strongest line between 20 Hz and the Nyquist frequency is told; which rotor it is, is not known.
+
+What turns faster than the sensor sees is folded below the Nyquist frequency, so the level of all above 20 Hz still
+tells whether a rotor shakes, and how much more than in healthy flights, though not which one.
 """
 
 from __future__ import annotations
@@ -24,8 +27,9 @@ _WINDOWS_S, _MOST_S, _LOW_HZ, _LEAST = (1.0, 2.0, 4.0), 120.0, 20.0, 3  # length
 _APART, _FOLLOWED = 5.0, 0.5  # largest condition number of the angles; least share of the line's power [1]
 _SIDE = 3  # half width of a band in bins: the lobe of the window and a speed that is off by one bin
 _SPREAD, _FREE = 0.35, 4
-"""Scatter of the log of an amplitude between healthy flights, and the degrees of freedom it counts as: an assumption,
-not checked (a factor of 1.4; no recording here holds vibration at the shaft frequency)."""
+"""Scatter of the log of an amplitude between healthy flights, and the degrees of freedom it counts as. Levels of three
+Crazyflies (IMRC: brushed, brushless, with a payload) scatter by 0.35, 0.07 and 0.18: the least steady one counts."""
+_MOST = float(np.log(10.0))  # by how much a rotor at fault raises the log of a level, at most (declared)
 _FLOOR = {"m/s2": 0.2, "rad/s": 0.02}
 """Amplitude below which no rotor is unbalanced in any way that matters (an assumption)."""
 
@@ -47,6 +51,17 @@ class Vibration:
     stated: bool = False  # Whether the autopilot states it (VIBE)
     unit: str = "m/s2"  # m/s2, or rad/s of a gyro
     missing: str = ""  # What the log cannot show, and why
+
+    @property
+    def level(self) -> float:
+        """Logarithm of the root mean square of all axes, no less than a sensor's noise; NaN where there is none."""
+        least = 0.1 * _FLOOR[self.unit]
+        return float(np.log(max(float(np.linalg.norm(self.rms)), least))) if self.rms else float("nan")
+
+    def alike(self, other: Vibration) -> bool:
+        """Whether the levels of both are of one kind: same unit, both stated or neither, same rate within a tenth."""
+        same = (self.unit, self.stated) == (other.unit, other.stated)
+        return same and (self.stated or abs(self.rate_hz / other.rate_hz - 1.0) < 0.1)
 
 
 def vibration(log: FlightLog) -> Vibration:
@@ -74,14 +89,16 @@ def _found(log: FlightLog) -> Vibration:
     step = float(np.median(np.diff(t)))
     rate = 1.0 / step
     nyquist = 0.5 * rate
+    windows = _windows(log, t, step, _WINDOWS_S[0])
+    few = "under 3 s of samples" if len(windows) < _LEAST else ""
+    few = f"{rate:.0f} samples a second of the accelerometer" if nyquist < 2.0 * _LOW_HZ else few
+    rms = () if few else _rms(v, windows, step)
     if np.isfinite(shaft) and shaft > 0.97 * nyquist:
         why = (f"the shaft turns at {shaft:.0f} Hz and the {'accelerometer' if log.raw_unit == 'm/s2' else 'gyro'} has "
                f"{rate:.0f} samples a second, which show up to {0.97 * nyquist:.0f} Hz")  # fmt: skip
-        return Vibration(rate, shaft, unit=log.raw_unit, missing=why)
-    windows = _windows(log, t, step, _WINDOWS_S[0])
-    if len(windows) < _LEAST or nyquist < 2.0 * _LOW_HZ:
-        why = f"{rate:.0f} samples a second of the accelerometer" if nyquist < 2.0 * _LOW_HZ else "under 3 s of samples"
-        return Vibration(rate, shaft, unit=log.raw_unit, missing=f"{why} are too few")
+        return Vibration(rate, shaft, rms=rms, unit=log.raw_unit, missing=why)
+    if few:
+        return Vibration(rate, shaft, unit=log.raw_unit, missing=f"{few} are too few")
     f, power = _spectrum(v, windows, step)
     if speeds is None or not np.isfinite(shaft):
         mean = power.mean(axis=0)
@@ -91,7 +108,7 @@ def _found(log: FlightLog) -> Vibration:
         seen = double < mean.size - 3 * _SIDE
         twice_ = _line(mean, double - 2 * _SIDE, double + 2 * _SIDE) if seen else float("nan")
         return Vibration(rate, shaft, line_hz=float(f[peak]), line=_line(mean, peak - _SIDE, peak + _SIDE),
-                         twice=twice_, rms=_rms(v, windows, step), unit=log.raw_unit,
+                         twice=twice_, rms=rms, unit=log.raw_unit,
                          missing="which rotor shakes: log the speed of each")  # fmt: skip
     turns = np.stack([np.interp(t, log.t, s) for s in speeds.T], axis=1)
     span = np.array([[turns[w].min(), turns[w].max()] for w in windows]) / f[1]
@@ -99,7 +116,7 @@ def _found(log: FlightLog) -> Vibration:
                            for p, (low, high) in zip(power, span, strict=True)]))  # fmt: skip
     once, twice, why = _by_rotor(v, t, turns, [_windows(log, t, step, s) for s in _WINDOWS_S], total, rate / shaft)
     return Vibration(rate, shaft, once, twice, line_hz=shaft, line=float(np.sqrt(total)), unit=log.raw_unit,
-                     rms=_rms(v, windows, step), missing=f"which rotor shakes: {why}" if why else "")  # fmt: skip
+                     rms=rms, missing=f"which rotor shakes: {why}" if why else "")  # fmt: skip
 
 
 def _rms(v: Array, windows: list[slice], step: float) -> tuple[float, ...]:
@@ -207,10 +224,33 @@ def shaken(mine: Vibration, healthy: Sequence[Vibration]) -> tuple[tuple[int, fl
         before = past if past.size else rest[np.isfinite(rest)]
         if not np.isfinite(logs[k]) or before.size < (1 if past.size else 2) or (total and out):
             continue
-        n = before.size
-        free = _FREE + n - 1
-        square = (_FREE * _SPREAD**2 + float(np.sum((before - before.mean()) ** 2))) / free * (1.0 + 1.0 / n)
-        change = float(logs[k] - before.mean())
-        if change > float(stats.t.ppf(1.0 - ALARM / logs.size, free)) * np.sqrt(square):
+        mean, sd, free = _next(before)
+        change = float(logs[k] - mean)
+        if change > float(stats.t.ppf(1.0 - ALARM / logs.size, free)) * sd:
             out.append((-1 if total else k, float(np.exp(change)), bool(past.size)))
     return tuple(out)
+
+
+def _next(before: Array) -> tuple[float, float, int]:
+    """Mean and standard deviation of the log of the next healthy flight's amplitude, and the degrees of freedom."""
+    n, mean = before.size, float(before.mean())
+    free = _FREE + n - 1
+    square = (_FREE * _SPREAD**2 + float(np.sum((before - mean) ** 2))) / free * (1.0 + 1.0 / n)
+    return mean, float(np.sqrt(square)), free
+
+
+def level_odds(level: float, healthy: Sequence[float], seen: float) -> float:
+    """Logarithm of how much likelier a level is with a rotor at fault than with none; 0 where nothing is known.
+
+    A fault raises it in the share `seen` of the cases [1], by any factor up to ten; else it is as in healthy flights.
+    """
+    from scipy import stats
+
+    before = np.array([v for v in healthy if np.isfinite(v)])
+    if not np.isfinite(level) or not before.size:
+        return 0.0
+    mean, sd, free = _next(before)
+    z = (level - mean) / sd
+    calm = float(stats.t.pdf(z, free)) / sd
+    raised = float(stats.t.sf(z - _MOST / sd, free) - stats.t.sf(z, free)) / _MOST
+    return float(np.log((1.0 - seen) + seen * raised / calm))
