@@ -379,6 +379,14 @@ def test_condition_leaves_exact_numbers_and_missing_rows_alone() -> None:
     assert np.isfinite(found.mean).all()
 
 
+def test_readings_are_doubted_for_contradicting_each_other_and_one_contradicts_none() -> None:
+    T, prior, noise = np.ones((2, K)), Prior(np.zeros(K), np.eye(K), np.ones(1), np.ones(1)), np.eye(2)
+    tail = population().rest_sizes, WEIGHTS
+    one = condition(lambda z: T[:1] @ z, prior, np.array([40.0]), noise[:1, :1], *tail)
+    apart = condition(lambda z: T @ z, prior, np.array([40.0, -40.0]), noise, *tail)
+    assert one.excess == 1.0 and apart.excess > 50.0
+
+
 @pytest.mark.parametrize(
     ("blade", "where"),
     [

@@ -64,7 +64,7 @@ def condition(
     tail, else halved.  The heavy tail is a mixture of sizes: the posterior weights take the place of
     s^2 = (nu s0^2 + x^2)/(nu + 1).  Readings that lie further off than the largest of the noise's usual sizes bears are
     believed less, by Birge's ratio (R. T. Birge, Physical Review 40, 1932, p. 207, not checked): a run that fits no
-    rotor moves none.
+    rotor moves none.  The ratio is of readings to each other, so one alone has none: it is this rotor's.
     """
     z = np.array(prior.mean, dtype=float)
     f = np.asarray(solve(z), dtype=float)
@@ -97,7 +97,7 @@ def condition(
             break
         z, f, T, here = at, f_new, T_new, there
         converged = bool(np.all(np.abs(here.mean - z) <= tolerance * np.sqrt(np.diag(here.cov))))
-    if noise_sizes is not None and noise_weights is not None:
+    if noise_sizes is not None and noise_weights is not None and target.size > 1:
         largest = float(noise_sizes[noise_weights >= RARE].max())
         left = np.linalg.solve(white, target - f[kept] - T[kept] @ (here.mean - z))
         excess = float(left @ left) / (left.size * largest**2)

@@ -86,9 +86,12 @@ class RealRotor:
         D, beta = model.diameter_m, beta75_deg(model)
         return RealRotor(coefficients(model, air), D, beta, prior, drawn, reference, model.duct is not None)
 
-    def at(self, rpm: Array, J: Array, Re: Array) -> Sensed:
-        """The solver at points, (P,) each: rpm [rev/min], advance ratio and Reynolds number at 0.75 R [1]."""
-        return sense(self.solve, self.diameter_m, self.beta75_deg, rpm, J, Re, self.drawn)
+    def at(self, rpm: Array, J: Array, Re: Array, f: Array | None = None) -> Sensed:
+        """The solver at points, (P,) each: rpm [rev/min], advance ratio and Reynolds number at 0.75 R [1].
+
+        ``f`` is what it gives there, (2, P) of CT and CP, where that is known.
+        """
+        return sense(self.solve, self.diameter_m, self.beta75_deg, rpm, J, Re, self.drawn, f)
 
     def expected(self, at: Sensed) -> Array:
         """Expectation of CT and CP with the solver taken as linear around ``drawn``, (2, P) [1]."""

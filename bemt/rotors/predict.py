@@ -157,12 +157,13 @@ def zero_thrust(solve: Solve, z: Array, rpm: float) -> float:
 
 
 def sense(
-    solve: Solve, diameter_m: float, beta75_deg: float, rpm: Array, J: Array, Re: Array, z: Array | None = None
-) -> Sensed:
-    """Solve points and take the slopes there, 2 K + 2 calls; ``beta75_deg`` is the blade angle as drawn."""
+    solve: Solve, diameter_m: float, beta75_deg: float, rpm: Array, J: Array, Re: Array, z: Array | None = None,
+    f: Array | None = None,
+) -> Sensed:  # fmt: skip
+    """Solve points, unless that was done (``f``), and take the slopes; ``beta75_deg`` is the blade angle as drawn."""
     z = np.zeros(len(NAMES)) if z is None else z
     points = np.arange(rpm.size)
-    f = solve(z, rpm, J, points)
+    f = solve(z, rpm, J, points) if f is None else f
     top = solve(z, rpm, np.zeros_like(J), points)
     slopes = tangents(lambda at: solve(at, rpm, J, points).reshape(-1), z)
     T = slopes.reshape(2, rpm.size, -1).transpose(0, 2, 1)

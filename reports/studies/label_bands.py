@@ -29,10 +29,11 @@ STANDS = {
     "jmajew/*_aeronaut-12x6_3s_*": "12x6", "jmajew/*_graupner-12x6_3s_*": "12x6", "jmajew/*_graupner-10x6_4s_*": "10x6",
     "jmajew/*_aeronaut-9x7_4s_*": "9x7", "jmajew/*_gemfanbull6045_3s_*": "6x4.5", "jmajew/*_hqprop6x3-5_3s_*": "6x3.5",
     "jmajew/*_hqprop6x4x3_3s_*": "6x4x3", "rcbenchmark/a1_*": "5x4x3", "rcbenchmark/a2_*": "5x4.5x3",
-    "rcbenchmark/a3_*": "5x4.5x3", "rcbenchmark/a4_*": "5x4",
+    "rcbenchmark/a3_*": "5x4.5x3", "rcbenchmark/a4_*": "5x4", "rcbenchmark/Log_2019-11-05_171350": "7x5.6x3",
 }  # fmt: skip
 _COLUMNS = {"rpm": ("rpm", 1.0), "th": ("thrust_N", 1e-3 * G0), "tq": ("torque_Nm", 1e-5 * G0),
-            "Motor Electrical Speed (RPM)": ("rpm", 1.0), "Thrust (gf)": ("thrust_N", 1e-3 * G0)}  # fmt: skip
+            "Motor Electrical Speed (RPM)": ("rpm", 1.0), "Thrust (gf)": ("thrust_N", 1e-3 * G0),
+            "Torque (N·m)": ("torque_Nm", 1.0)}  # fmt: skip
 
 
 def stands(data: Path) -> Iterator[str]:
@@ -42,17 +43,18 @@ def stands(data: Path) -> Iterator[str]:
         table = pd.concat([pd.read_csv(f, encoding="utf-8-sig") for f in sorted(data.glob(f"{pattern}.csv"))])
         read = {name: factor * table[c].to_numpy(float) for c, (name, factor) in _COLUMNS.items() if c in table}
         fast = read["rpm"] > 0.5 * np.nanmax(read["rpm"])
-        found = propagate(case_of(fresh.label_text(label, measured=False), ends=False), read["rpm"][fast], 0.0, 1.2)
         for name in ("thrust_N", "torque_Nm"):
             if name in read:
-                y = read[name][fast]
+                rows = fast & np.isfinite(read[name])  # load cells of logs have rows of their own
+                case = case_of(fresh.label_text(label, measured=False), ends=False)
+                found, y = propagate(case, read["rpm"][rows], 0.0, 1.2), read[name][rows]
                 off = np.asarray(found.points[name]) - y
                 shares = [float(np.mean(np.abs(off) <= u)) for u in (found.u_reading(name), found.reading95(name))]
                 held.setdefault(name, []).append(shares)
-                yield (f"{label:8} {pattern:32} {name:10} {y.size:4d} off by {100 * np.median(off / y):6.1f} %   "
+                yield (f"{label:8} {pattern:36} {name:10} {y.size:4d} off by {100 * np.median(off / y):6.1f} %   "
                        f"{100 * shares[0]:4.0f}/{100 * shares[1]:4.0f}")  # fmt: skip
-    for name, rows in held.items():
-        yield f"{name}: {len(rows)} propellers, {' / '.join(f'{100 * v:.0f}' for v in np.mean(rows, axis=0))}"
+    for name, each in held.items():
+        yield f"{name}: {len(each)} propellers, {' / '.join(f'{100 * v:.0f}' for v in np.mean(each, axis=0))}"
 
 
 def main(words: list[str] | None = None) -> int:

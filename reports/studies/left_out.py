@@ -56,6 +56,8 @@ _WORDS = {
     "unseen": "as built, family and section unknown",
     "on_static": "the same, after its static run",
     "on_static_and_one": "the same, after static run and one flight point",
+    "on_hover": "the same, after one hover thrust",
+    "on_hover_and_one": "the same, after that thrust and one flight point",
 }
 Say = Callable[[str], None] | None
 
@@ -108,9 +110,9 @@ def leave_out(seen: Sequence[Observed], name: str, fitted: tuple[Population, Any
                 pools[key].add(found.rows, found)
             pools["as_drawn"].add(one.drawn)
             if one.record.static.any() and not one.record.static.all():
-                for on in ("static", "static_and_one"):
+                for on in (key.removeprefix("on_") for key in _WORDS if key.startswith("on_")):
                     told = conditioned(one, p, on)
-                    pools[f"on_{on}"].add(told.rows, told, ("forward",))
+                    pools[f"on_{on}"].add(told.rows, told, KINDS if on.startswith("hover") else ("forward",))
     out = {"schema": SCHEMA, "folder": name, "families": families} | {
         k: pool.total().document() for k, pool in pools.items()
     }
@@ -135,27 +137,47 @@ def transfer(seen: Sequence[Observed], numbers: Any, say: Say = None) -> dict[st
 
 
 def conditioned(seen: Observed, p: Population, on: str) -> Expected:
-    """Expectation after conditioning on points of one kind, see `conditioned_law`; those of the other count."""
-    return lying(seen, p, *conditioned_law(seen, p, on))
+    """Expectation after conditioning on some points, see `told_by`; the other ones count."""
+    told, drawn = lying(seen, p, *conditioned_law(seen, p, on)), seen.drawn
+    kinds = counted(drawn)
+    known = np.zeros(drawn.J.size, bool)
+    known[
+        np.flatnonzero(np.logical_or.reduce(list(kinds.values())) & np.isfinite(drawn.CT_bemt))[told_by(seen, on)]
+    ] = True
+    left = {
+        name: {k: {q: v[~known[kinds[k]]] for q, v in of.items()} for k, of in getattr(told, name).items()}
+        for name in ("probability", "width", "log_density")
+    }
+    return replace(told, rows=replace(told.rows, CT=np.where(known, np.nan, told.rows.CT)), **left)
+
+
+def told_by(seen: Observed, on: str) -> np.ndarray:
+    """Points of the record on which a rotor is conditioned, (P,).
+
+    ``on`` is ``static``, ``forward``, ``all``, or ``hover``, one point in the middle of the static run; with
+    ``_and_one`` the forward point nearest to half of the zero-thrust J too.
+    """
+    m, kind = seen.record, on.removesuffix("_and_one")
+    run = np.flatnonzero(
+        {"static": m.static, "forward": ~m.static, "hover": m.static}.get(kind, np.ones(m.J.size, bool))
+    )
+    few = run[np.unique(np.linspace(0, run.size - 1, min(run.size, RUN_POINTS)).round().astype(int))]
+    run = run[np.argsort(m.Re[run])[run.size // 2 :][:1]] if kind == "hover" else few
+    if kind == on:
+        return run
+    J0 = seen.drawn.J0_bemt
+    middle = 0.5 * (J0 if math.isfinite(J0) else float(m.J.max()) / J_SHARE)
+    return np.append(run, np.argmin(np.where(m.static, np.inf, np.abs(m.J - middle))))
 
 
 def conditioned_law(seen: Observed, p: Population, on: str) -> tuple[Prior, ReferenceRun]:
-    """Latent numbers of a propeller and rows of the run after conditioning on some of its points.
-
-    ``on`` is ``static``, ``forward``, ``all``, or ``static_and_one``: the forward point nearest to half of the
-    zero-thrust J too.
-    """
-    m, drawn = seen.record, seen.drawn
-    good = counted(drawn)
-    good["all"] = np.logical_or.reduce(list(good.values()))
-    here = good["all"] & np.isfinite(drawn.CT_bemt)
+    """Latent numbers of a propeller and rows of the run after conditioning on `told_by`, of a hover on its thrust."""
+    m, drawn, run = seen.record, seen.drawn, told_by(seen, on)
+    here = np.logical_or.reduce(list(counted(drawn).values())) & np.isfinite(drawn.CT_bemt)
     rpm, J = drawn.rpm[here], drawn.J[here]
-    run = np.flatnonzero(good[on.removesuffix("_and_one")][here])
-    run = run[np.unique(np.linspace(0, run.size - 1, min(run.size, RUN_POINTS)).round().astype(int))]
-    if on.endswith("_and_one"):
-        middle = 0.5 * (drawn.J0_bemt if math.isfinite(drawn.J0_bemt) else float(m.J.max()) / J_SHARE)
-        run = np.append(run, np.argmin(np.where(m.static, np.inf, np.abs(m.J - middle))))
     prior, at, y = law(p, m), m.part(run), m.y[:, run]
+    if on.startswith("hover"):
+        y[1, 0] = np.nan
     still = m.static[run]
     rough = np.array([[scatter(a, at.Re[still])] for a in (y - at.f)[:, still]]) * still
     noise = noise_of_run(p, at, y, np.hypot(p.noise_sd(at), rough))

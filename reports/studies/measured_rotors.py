@@ -25,8 +25,9 @@ from bemt.data.readers.uiuc import UiucPropeller
 from bemt.physics.air import Air
 from bemt.rotors import measured
 from bemt.rotors.as_measured import as_measured
-from bemt.rotors.case import case_of, fresh
+from bemt.rotors.case import Case, case_of, fresh
 from bemt.rotors.case.propagate import propagate
+from bemt.rotors.case.reading import with_reading
 from bemt.rotors.conditioning import apart
 from bemt.rotors.measured import MeasuredRotor
 from bemt.rotors.population import Population, population
@@ -86,15 +87,35 @@ def record(seen: Observed, p: Population) -> MeasuredRotor:
     )  # fmt: skip
 
 
-def predicted(text: str, seen: Observed) -> dict[str, np.ndarray]:
-    """Errors of CT and CP over the reading at the points that count, and whether u and the 95 % interval hold them."""
-    case, m = case_of(text, ends=False), seen.record
+def conditions(seen: Observed) -> tuple[np.ndarray, np.ndarray]:
+    """Speed [rev/min] and advance ratio of the points that count, (P,) each."""
     good = np.logical_or.reduce(list(counted(seen.drawn).values())) & np.isfinite(seen.drawn.CT_bemt)
-    rpm, J = seen.drawn.rpm[good], seen.drawn.J[good]
+    return seen.drawn.rpm[good], seen.drawn.J[good]
+
+
+def predicted(case: Case, seen: Observed, again: bool = False) -> dict[str, np.ndarray]:
+    """Errors of CT and CP over the reading at the points that count, and whether u and the 95 % interval hold them.
+
+    Bands of the rotor, or with ``again`` those of a reading.
+    """
+    m, (rpm, J) = seen.record, conditions(seen)
     found = propagate(case, rpm, J * rpm / 60.0 * case.diameter_m, float(Air.from_density().rho))
     off = np.array([found.points.CT, found.points.CP]) - m.y
-    u, u95 = (np.array([of(q) for q in ("CT", "CP")]) for of in (found.points.u.__getitem__, found.half_width95))
+    bands = (found.u_reading, found.reading95) if again else (found.points.u.__getitem__, found.half_width95)
+    u, u95 = (np.array([of(q) for q in ("CT", "CP")]) for of in bands)
     return {"error": off / m.y, "held68": np.abs(off) <= u, "held95": np.abs(off) <= u95}
+
+
+def calibrated(text: str, seen: Observed) -> Case:
+    """The rotor of a label as a run of its own shows it: up to `STILL` + `FLIGHT` of its points."""
+    case, m, (rpm, J) = case_of(text, ends=False), seen.record, conditions(seen)
+    rows = [np.flatnonzero(m.static), np.flatnonzero(~m.static)]
+    rows = [r[np.unique(np.linspace(0, r.size - 1, min(n, r.size)).round().astype(int))]
+            for r, n in zip(rows, (STILL, FLIGHT), strict=True) if r.size]  # fmt: skip
+    n, D, rho = rpm / 60.0, seen.propeller.diameter_m, float(Air.from_density().rho)
+    return with_reading(case, [
+        {"rpm": rpm[i], "V_m_s": J[i] * n[i] * D, "thrust_N": m.y[0, i] * rho * n[i] ** 2 * D**4,
+         "power_W": m.y[1, i] * rho * n[i] ** 3 * D**5} for i in np.concatenate(rows)])  # fmt: skip
 
 
 def sittings(p: UiucPropeller) -> list[UiucPropeller]:
@@ -120,6 +141,10 @@ def sittings(p: UiucPropeller) -> list[UiucPropeller]:
 Predicted = dict[str, list[tuple[np.ndarray, dict[str, np.ndarray]]]]
 
 
+HOW = ("with", "without", "calibrated", "its stand")
+"""Known by the other measurement in the database, by the label, by the other as its own run: rotor, and reading."""
+
+
 def twins_of(seen: Sequence[Observed]) -> list[list[Observed]]:
     """What was measured more than once."""
     groups: dict[tuple[object, ...], list[Observed]] = {}
@@ -132,17 +157,20 @@ def twins_of(seen: Sequence[Observed]) -> list[list[Observed]]:
 
 def each_other(twins: Sequence[Observed]) -> Predicted:
     """Every measurement of a propeller, predicted with and without another one of it; which points are static."""
-    found: Predicted = {"with": [], "without": []}
+    found: Predicted = {how: [] for how in HOW}
     for target in twins:
         text, still = case_text(target), target.record.static
-        found["without"].append((still, predicted(text, target)))
+        found["without"].append((still, predicted(case_of(text, ends=False), target)))
         for other in (one for one in twins if one is not target):
             known = record(other, population())
             known = replace(known, name=f"{known.name}@{known.volume}")
             measured.records()[known.name] = known
             told = f'known_from = "measured"\n\n[blade.as_built]\nmeasured = "{known.name}"\n\n[blade.section]'
             short = text[: text.index("\n[[assumptions]]")].replace("[blade.section]", told)
-            found["with"].append((still, predicted(short, target)))
+            found["with"].append((still, predicted(case_of(short, ends=False), target)))
+            own = calibrated(text, other)
+            found["calibrated"].append((still, predicted(own, target)))
+            found["its stand"].append((still, predicted(own, target, again=True)))
     return found
 
 
@@ -153,8 +181,8 @@ def parts_apart(one: tuple[list[UiucPropeller], Stations]) -> Predicted:
 
 def table(of: Sequence[Predicted]) -> str:
     """Errors and coverage of propellers that were measured more than once."""
-    lines = [f"{'':10}{'':8}{'':>4} {'pairs':>6} {'median':>7} {'p90':>6} {'68 %':>6} {'95 %':>6}"]
-    for how in ("with", "without"):
+    lines = [f"{'':11}{'':8}{'':>4} {'pairs':>6} {'median':>7} {'p90':>6} {'68 %':>6} {'95 %':>6}"]
+    for how in HOW:
         rows = [row for one in of for row in one[how]]
         for kind, still in (("static", True), ("forward", False)):
             for i, q in enumerate(("CT", "CP")):
@@ -164,7 +192,7 @@ def table(of: Sequence[Predicted]) -> str:
                     error = np.abs([np.median(one["error"]) for one in own])
                     held = [100.0 * np.mean([one[k].mean() for one in own]) for k in ("held68", "held95")]
                     shown = [100.0 * np.median(error), 100.0 * np.quantile(error, 0.9), *held]
-                    lines.append(f"{how:10}{kind:8}{q:>4} {len(own):6d} " + " ".join(f"{v:6.1f}" for v in shown))
+                    lines.append(f"{how:11}{kind:8}{q:>4} {len(own):6d} " + " ".join(f"{v:6.1f}" for v in shown))
     return "\n".join(lines)
 
 

@@ -13,6 +13,7 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.physics.bem import kernel as K
@@ -53,7 +54,7 @@ from bemt.physics.bem.oblique import (
 )
 from bemt.physics.bem.vecmath import atan2, fingerprint, inlined, njit, ready, wide
 
-SKIP = 4
+SKIP = 5
 """One of so many annuli is solved of a rotor that is near another one [1]."""
 _THERE = 1e-6  # so near a root is at it [rad]
 _NEAR, _STEPS = 3e-3, 4  # the loads' secant goes on to a root so near [rad] after so many steps at most [1]
@@ -72,16 +73,12 @@ def _near(lookup, point, roots, st, tab, par, cs, sn, R, skip, out):
     Vy = point[P_SIDE]
     out[:] = 0.0
     out[O_WHERE] = -1.0
-    ratio = roots.shape[0] / st.shape[0]
     for i in range(skip // 2, st.shape[0], skip):
         r = st[i, S_R]
         UT = point[P_OMEGA] * r * st[i, S_TANG_FACTOR] + st[i, S_TANG]
         UP = point[P_V] * st[i, S_AXIAL_FACTOR] + st[i, S_AXIAL]
-        place = (i + 0.5) * ratio - 0.5  # between hub and tip: annuli of both rotors are spaced alike
-        j = min(max(int(place), 0), roots.shape[0] - 2)
-        x = place - j
-        phi = roots[j, 0] + x * (roots[j + 1, 0] - roots[j, 0]) + atan2(UP, UT)
-        slope = (roots[j, 1] + x * (roots[j + 1, 1] - roots[j, 1])) * abs(UT)
+        phi = roots[i, 0] + atan2(UP, UT)
+        slope = roots[i, 1] * abs(UT)
         flap = (point[P_CONE], point[P_BACK], point[P_TOWARD], point[P_OMEGA] * r)
         lre = log_rho_mu + st[i, S_LOGC]
         base = np.int32(stride * i)
@@ -142,25 +139,25 @@ _ENTRIES = _entries(fingerprint(oblique, residual, vecmath, K))
 class Near:
     """Loads of rotors that are like one that is solved, at the same points: secant steps from its roots.
 
-    The first rotor is solved in full. Others add to its loads what these steps change, in every `SKIP`-th annulus where
-    they have as many as it; where the steps end at no root, the point is solved in full.
+    The first rotor is solved in full. Others add to its loads what these steps change in every `SKIP`-th annulus; where
+    the steps end at no root, the point is solved in full.
     """
 
     def __init__(self) -> None:
-        self._roots = self._whole = np.empty((0, 0))
-        self._own: dict[int, Array] = {}
+        self._roots = self._whole = self._own = np.empty((0, 0))
+        self._far: NDArray[np.bool_] = np.empty(0, np.bool_)
 
     def run(self, layout: str, points: Array, st: Array, tab: Array, par: Array, R: float) -> tuple[Array, Array]:
         """Columns of the kernel (P, N_OUT); hub loads (P, 4), of the first rotor alone."""
         given = st, tab, par
-        if self._roots.shape[0] != points.shape[0]:
+        if self._roots.shape[:2] != (points.shape[0], st.shape[0]):
             self._roots = np.full((points.shape[0], st.shape[0], 2), np.nan)
             self._whole, hub, _ = run(layout, points, *given, R, roots=self._roots)
-            self._own = {k: self._step(layout, points, *given, R, k) for k in (1, SKIP)}
+            self._own = self._step(layout, points, *given, R)
+            self._far = np.asarray(np.isnan(self._roots[..., 0]).any(axis=1))
             return self._whole.copy(), hub
-        skip = SKIP if st.shape[0] == self._roots.shape[1] else 1
-        found, own = self._step(layout, points, *given, R, skip), self._own[skip]
-        far = (self._own[1][:, O_WHERE] >= 0.0) | (found[:, O_WHERE] >= 0.0) | ~np.isfinite(found[:, O_T])
+        found, own = self._step(layout, points, *given, R), self._own
+        far = self._far | (found[:, O_WHERE] >= 0.0) | ~np.isfinite(found[:, O_T])
         out, hub = self._whole.copy(), np.full((points.shape[0], 4), np.nan)
         for k in (O_T, O_Q, O_MASS):
             out[:, k] += found[:, k] - own[:, k]
@@ -168,9 +165,9 @@ class Near:
             out[far], hub[far], _ = run(layout, points[far], *given, R)
         return out, hub
 
-    def _step(self, layout: str, points: Array, st: Array, tab: Array, par: Array, R: float, skip: int) -> Array:
+    def _step(self, layout: str, points: Array, st: Array, tab: Array, par: Array, R: float) -> Array:
         few = azimuths(AZIMUTHS // 2)
         out = np.empty((points.shape[0], K.N_OUT))
         entry = ready(_ENTRIES[layout])
-        entry(_whole(points), self._roots, st, tab, par, np.cos(few), np.sin(few), R, skip, out)
+        entry(_whole(points), self._roots, st, tab, par, np.cos(few), np.sin(few), R, SKIP, out)
         return out

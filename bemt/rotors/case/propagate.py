@@ -263,8 +263,8 @@ def propagate(
     """Solve a case at points [rev/min], [m/s], [kg/m3], by default its own, with bands and flags.
 
     ``angle_deg`` is that between wind and shaft, 0 to 180; ducted rotors know 0 only. In oblique flow the model's own
-    error is that of axial flow at the speed along the shaft and a share of what the side wind changes
-    (:func:`bemt.rotors.validity.aside`); the point is flagged.
+    error and that of its numerics are those of axial flow at the speed along the shaft, with a share of what the side
+    wind changes (:func:`bemt.rotors.validity.aside`); the point is flagged.
     Whatever a point shares with the case - speed, airspeed, angle, air - follows an unknown that is that quantity.
     ``bands`` False leaves the uncertainties unknown; the flags stay.
     """
@@ -284,13 +284,11 @@ def propagate(
         from bemt.physics.bem import oblique_near
 
         near = oblique_near.Near()
-    steps, done = 3 + sum(len(item.values) for item in (*declared, *of_second)), 0
+    steps, done = 2 + sum(len(item.values) for item in (*declared, *of_second)), 0
 
-    def solved(
-        changed: Case, what: str, stations: int | None = None, second: Case | None = None
-    ) -> tuple[Model | PairModel, Dataset]:
+    def solved(changed: Case, what: str, second: Case | None = None) -> tuple[Model | PairModel, Dataset]:
         nonlocal done
-        model = prepared(changed, stations, second).at_speeds(*points.conditions(changed))
+        model = prepared(changed, None, second).at_speeds(*points.conditions(changed))
         found = points.solve(model, changed, threads, near)
         done += 1
         if progress is not None:
@@ -301,11 +299,13 @@ def propagate(
         keys = (*BANDED, *LOADS, *RATIOS) if case.paired else BANDED
         return {key: np.asarray(found[key], dtype=float) for key in keys}
 
+    def along(model: Model | PairModel) -> Dataset:
+        """Axial flow at the speed along the shaft."""
+        rpm, V, air = points.conditions(case)
+        return model.solve(rpm, parted(V, points.angle_deg)[0], air, threads)
+
     model, found = solved(case, "nominal")
-    beside = found
-    if np.any(skewed):  # axial flow at the speed along the shaft
-        at = points.conditions(case)
-        beside = model.solve(at[0], parted(at[1], points.angle_deg)[0], at[2], threads)
+    beside = along(model) if np.any(skewed) else found
     if isinstance(model, PairModel):
         from bemt.rotors.case.pair_error import PairError
 
@@ -318,10 +318,11 @@ def propagate(
     if not bands:
         nothing = {key: np.full(len(found), np.nan) for key in nominal}
         return Propagated(replace(found, flags=flags), nominal, (), None, model, nothing)
-    refined = channels(solved(case, "twice the stations", 2 * case.file.model.stations)[1])
+    finer = channels(along(prepared(case, 2 * case.file.model.stations).at_speeds(*points.conditions(case))))
+    refined = {key: nominal[key] + (finer[key] - v) for key, v in channels(beside).items()}
     moved = vary(case, nominal, lambda changed, what: channels(solved(changed, what)[1]), declared)
     if of_second:
-        moved += vary(case.second(), nominal, lambda changed, what: channels(solved(case, what, None, changed)[1]),
+        moved += vary(case.second(), nominal, lambda changed, what: channels(solved(case, what, changed)[1]),
                       of_second)  # fmt: skip
     if isinstance(model, PairModel):
         narrow, wide = error.widths()
@@ -362,9 +363,13 @@ def model_error(case: Case, model: Model, points: Dataset, air: Air) -> tuple[Ar
     """
     known = case.as_built()
     rotor = RealRotor.of(model, air, known.prior, known.drawn, known.reference)
-    mean = rotor.solve(known.prior.mean, points.rpm, points.J, np.arange(points.rpm.size))
-    found = rotor.predict(rotor.at(points.rpm, points.J, points.Re75), mean)
-    off = found.mean - np.array([points.CT, points.CP])
+    solved = np.array([points.CT, points.CP])
+    at = rotor.at(points.rpm, points.J, points.Re75, solved if model.learned is None else None)
+    mean = at.f
+    if not np.array_equal(known.prior.mean, known.drawn):
+        mean = rotor.solve(known.prior.mean, points.rpm, points.J, np.arange(points.rpm.size))
+    found = rotor.predict(at, mean)
+    off = found.mean - solved
     elsewhere = _CAMPAIGNS.get(known.prior.known_from, 0.0)
     narrow, wide = (found.half_width(level, campaigns=elsewhere) for level in LEVELS)
     return np.hypot(narrow, off), np.hypot(wide, 2.0 * off)
