@@ -43,7 +43,7 @@ class MotorHeating(Effect):
         Parameter("rise_K", "K", 0.0, 120.0, "insulation class H, IEC 60034-1", 3, 0.0),
         Parameter("tau_s", "s", 20.0, 1800.0, "declared, small outrunner to large", 4),
         Parameter("copper", "1", 0.03, 0.4, "declared, share of the back-EMF at full load", 0),
-        Parameter("magnets", "1", 1.0, 10.0, "declared; time constant of the magnets over that of the winding", 0),
+        Parameter("magnets", "1", 1.0, 10.0, "declared; their time constant over the winding's", 0),
     )
     on_by_default = False
 
