@@ -339,8 +339,9 @@ def test_a_table_of_cell_sizes_is_the_study_of_their_counts(
     assert "order 2.23" in figure.note
 
 
-def test_the_cells_of_a_battery_are_no_grid(tmp_path: Path) -> None:
-    (tmp_path / "bench.csv").write_text("rpm,thrust (N),cells\n4000,3.1,4\n6000,7.0,4\n")
+@pytest.mark.parametrize(("head", "cells"), [("power (W)", 4), ("torque (Nm)", 4), ("temperature (C)", 2_000_000)])
+def test_the_cells_of_a_battery_are_no_grid_and_no_column_is_lost(tmp_path: Path, head: str, cells: int) -> None:
+    (tmp_path / "bench.csv").write_text(f"rpm,thrust (N),{head},cells\n4000,3.1,20,{cells}\n6000,7.0,21,{cells}\n")
     assert not isinstance(import_file(tmp_path / "bench.csv"), CfdRun)
 
 

@@ -41,6 +41,7 @@ from bemt.data.readers.headings import CELLS
 from bemt.data.recordings.cfd_setup import CONDITIONS, CfdRun, conditions_of, stated_of, with_grid_floor
 from bemt.data.recordings.channels import named
 from bemt.physics.dataset import Dataset, concat
+from bemt.physics.dataset.channels import channel_fault
 
 T = TypeVar("T")
 FS_THREE = 1.25
@@ -439,8 +440,8 @@ HEIGHT = re.compile(r"h(_m)?", re.IGNORECASE)
 def of_table(record: Dataset) -> Dataset:
     """Somebody's table with a column of cells or of their size, as a run on the finest grids; any other as it is.
 
-    Rows of one condition on several grids are no repeats; rows of unlike conditions on stated grids owe what a grid
-    costs elsewhere. A table that states its uncertainties keeps its rows.
+    Rows of one condition on several grids are no repeats; rows of unlike conditions on one grid owe what a grid costs
+    elsewhere, in a table of speeds and loads. A table that states its uncertainties keeps its rows.
     """
     column = next((k for k in record.values if CELLS.search(k)), None)
     counts = column is not None
@@ -451,13 +452,15 @@ def of_table(record: Dataset) -> Dataset:
         return record
     cells, alone = record[column], len(groups(d)) == len(d)
     known = np.unique(cells[np.isfinite(cells)])
-    if known.size < (1 if alone else 2) or (alone and not (counts and known[0] > FEWEST)):
+    several = {k for k, v in record.texts.items() if k.lower() in CONDITIONS and len({*v}) > 1}
+    more = [k for k in d.values if k not in (*LOADS, *_SAME) and not channel_fault(k)]  # which a run has no place for
+    if (several or more or not counts or known.size != 1 or known[0] < FEWEST) if alone else known.size < 2:
         return record
     unit = "m" if column.endswith("_m") else ""
     if HEIGHT.fullmatch(column):
         note = f"{column}: a height, or the size of cells? A grid study takes it from a column headed cell_size"
         return replace(record, notes=(*record.notes, note))
-    told = {k.lower(): v[0] for k, v in record.texts.items() if k.lower() in CONDITIONS and len({*v}) == 1}
+    told = {k.lower(): v[0] for k, v in record.texts.items() if k.lower() in CONDITIONS and k not in several}
     values = {k: v for k, v in d.values.items() if k in (*LOADS, *_SAME)}
     made = CfdRun("cfd", record.name, values, provenance={**record.provenance, "format": "cfd_run"},
                   notes=record.notes, files=(record.file,), conditions=told)  # fmt: skip

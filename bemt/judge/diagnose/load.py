@@ -72,7 +72,10 @@ def load(
     from bemt.data.recordings.reduce import reduce, reduction
 
     if imported is None:
-        imported = run_at(path, rpm, airspeed_m_s) or import_file(path)
+        imported = run_at(path, rpm, airspeed_m_s)
+    if imported is None:
+        imported = import_file(path)
+        imported = filled(imported, rpm, airspeed_m_s, density_kg_m3) if is_run(imported) else imported
     if not is_run(imported):
         _one_setup(imported, path)
         one_rotor(imported, path, "`compare A B --rows-b rotor={} --case CASE` takes one of them")
