@@ -124,7 +124,7 @@ Declare an unknown like any other: `[[assumptions]]` with `key = "drive.battery.
 
 STUDY = """One condition on several grids is a study, and every command takes it as a run:
 `bemt import COARSE MEDIUM FINE --out study.toml` writes it (with `--setup cells=0.5e6,1.7e6,5.8e6` if the files do not
-state their cells). A table with a varying column of cells, or of their size (`cell_size`, `base size`), is
+state their cells). A table with a column of cells, or a varying one of their size (`cell_size`, `base size`), is
 one, too. Its value is that of the finest grid. Its
 uncertainty is GCI / 1.15 with the observed order of the finest three (Celik 2008; Roache 1994: factor 1.25, with two
 grids 3 and order 2); where values oscillate, diverge or give an order below 0.5, it is three times their spread

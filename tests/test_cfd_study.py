@@ -150,6 +150,15 @@ def runs(tmp_path: Path) -> list[str]:
     return made
 
 
+@pytest.fixture
+def tables(tmp_path: Path) -> list[str]:
+    """A table for each grid, with the cells in a column."""
+    made = [tmp_path / f"table_{cells:.0f}.csv" for cells in GRIDS]
+    for path, (cells, T) in zip(made, GRIDS.items(), strict=True):
+        path.write_text(f"rpm,thrust [N],torque [Nm],cells\n6000,{T},{0.015 * T},{cells:.0f}\n")
+    return list(map(str, made))
+
+
 def is_the_study(found: Dataset) -> None:
     assert len(found) == 1
     thrust = next(s for s in found.studies if s.channel == "thrust_N")
@@ -160,10 +169,10 @@ def is_the_study(found: Dataset) -> None:
     assert not any("no grid study" in note for note in found.notes)
 
 
-def test_three_runs_are_one_study_by_every_way_to_say_so(tmp_path: Path, runs: list[str]) -> None:
+def test_three_runs_are_one_study_by_every_way_to_say_so(tmp_path: Path, runs: list[str], tables: list[str]) -> None:
     options = {"rpm": 6000.0, "unit": ["thrust=N", "torque=N m"]}
     by_list = run_from(histories(tmp_path), **options, setup=["cells=0.5e6,1.7e6,5.8e6"])
-    for k, run in enumerate((run_from(runs), by_list)):
+    for k, run in enumerate((run_from(runs), by_list, run_from(tables))):
         is_the_study(assemble(run))
         path = write_run(run, str(tmp_path / f"study_{k}.toml"))
         is_the_study(import_file(path))
@@ -179,12 +188,16 @@ def test_three_runs_are_one_study_by_every_way_to_say_so(tmp_path: Path, runs: l
     is_the_study(found)
 
 
-def test_three_grids_are_no_repeats_where_a_diagnosis_reads_them(project: Path, runs: list[str]) -> None:
+def test_three_grids_are_no_repeats_where_a_diagnosis_reads_them(
+    project: Path, runs: list[str], tables: list[str]
+) -> None:
     case = str(project / "cases" / "prop_8x5")
-    (record,) = load_all(runs, [case])[1]
-    assert len(record) == 1
-    assert record.gain["thrust_N"] == pytest.approx(0.0146, abs=0.0003)
-    assert len(load_all(runs[:1], [case])[1]) == 1
+    for files in (runs, tables):
+        (record,) = load_all(files, [case])[1]
+        assert len(record) == 1
+        assert record.gain["thrust_N"] == pytest.approx(0.0146, abs=0.0003)
+        (alone,) = load_all(files[:1], [case])[1]
+        assert alone.gain["thrust_N"] == pytest.approx(grid_floor("thrust_N", False), rel=1e-3)
     assert load_case(Path(case) / "case.toml").name == "prop_8x5"
 
 
@@ -324,6 +337,12 @@ def test_a_table_of_cell_sizes_is_the_study_of_their_counts(
     assert import_file("study.toml").u["thrust_N"] == by_size.u["thrust_N"]
     (_, (figure,)), *_ = study_parts([one.document()])
     assert "order 2.23" in figure.note
+
+
+@pytest.mark.parametrize(("head", "cells"), [("power (W)", 4), ("torque (Nm)", 4), ("temperature (C)", 2_000_000)])
+def test_the_cells_of_a_battery_are_no_grid_and_no_column_is_lost(tmp_path: Path, head: str, cells: int) -> None:
+    (tmp_path / "bench.csv").write_text(f"rpm,thrust (N),{head},cells\n4000,3.1,20,{cells}\n6000,7.0,21,{cells}\n")
+    assert not isinstance(import_file(tmp_path / "bench.csv"), CfdRun)
 
 
 @pytest.mark.parametrize("size", [1, 100])

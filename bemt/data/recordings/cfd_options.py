@@ -194,7 +194,7 @@ def _grids(files: Sequence[str], told: Told, faults: list[Fault]) -> list[Mappin
         return []
     made = [(Path(f) / "run.toml").as_posix() if (Path(f) / "run.toml").is_file() else f for f in files]
     told.setdefault("cells", None)
-    return [{"files": (f,)} for f in made] if len(made) > 1 and all(_is_run(Path(f)) for f in made) else []
+    return [{"files": (f,)} for f in made] if len(made) > 1 and all(map(_is_grid, made)) else []
 
 
 def _home(file: str) -> object:
@@ -234,6 +234,16 @@ def _setup(texts: Sequence[str], faults: list[Fault]) -> Told:
             with suppress(ValueError):
                 out[name] = _WORDS[text.lower()] if text.lower() in _WORDS else float(text)
     return out
+
+
+def _is_grid(file: str) -> bool:
+    """Whether a file is a run by itself, and may be one grid of several."""
+    from bemt.data.recordings.cfd_run import run_of  # which needs this module
+
+    try:
+        return Path(file).is_file() and run_of(file) is not None
+    except InputError:  # said where it is read
+        return False
 
 
 def _is_run(path: Path) -> bool:

@@ -94,6 +94,14 @@ def run_at(path: str, rpm: float | None = None, airspeed_m_s: float | None = Non
     return assemble(RunToml.model_validate({"run": {"files": tuple(map(str, files)), **told}}), Path(), path)
 
 
+def run_of(path: str | Path) -> CfdRun | None:
+    """Run that a run.toml or a table on stated grids is by itself; None for any other file."""
+    from bemt.data.recordings.load import import_file  # which needs this module
+
+    found = import_file(path) if readers.detect(path) in ("cfd_run", "table") else None
+    return found if found is not None and is_run(found) else None
+
+
 def is_run(record: Dataset) -> TypeGuard[CfdRun]:
     """Whether a dataset is a run that was assembled here."""
     return isinstance(record, CfdRun)
@@ -208,9 +216,8 @@ def _grids(run: RunToml, folder: Path, name: str) -> CfdRun:
         at = [folder / f for f in grid.files]
         made = at[0] / "run.toml" if (at[0] / "run.toml").is_file() else at[0]
         try:
-            if len(at) == 1 and made.is_file() and readers.detect(made) == "cfd_run":
-                part = assemble(readers.read(made), made.parent, str(made))
-            else:
+            part = run_of(made) if len(at) == 1 and made.is_file() else None
+            if part is None:
                 files = tuple(str(f) for path in at for f in (cfd_files(path) if path.is_dir() else (path,)))
                 own = run.run.model_copy(update={"files": files})
                 setup = run.setup.model_copy(update={"cells": None})

@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
@@ -41,6 +41,7 @@ from bemt.data.readers.headings import CELLS
 from bemt.data.recordings.cfd_setup import CONDITIONS, CfdRun, conditions_of, stated_of, with_grid_floor
 from bemt.data.recordings.channels import named
 from bemt.physics.dataset import Dataset, concat
+from bemt.physics.dataset.channels import channel_fault
 
 T = TypeVar("T")
 FS_THREE = 1.25
@@ -307,7 +308,7 @@ def by_grid(d: CfdRun, cells: Array, size_unit: str | None = None) -> CfdRun:
     told |= {"cells": float(np.nanmax(cells[rows]))} if size_unit is None else {}
     if u_thrust := [s.u_relative for s in studies if s.channel in ("thrust_N", "CT") and s.u_relative >= 0.0]:
         told["u_grid"] = max(u_thrust)
-    random = d.u_by.get("random", d.u)
+    random = _of_its_own(d)
     values, u, grid = ({k: v[rows] for k, v in table.items()} for table in (d.values, random, sizes))
     labels = tuple(d.labels[i] for i in rows if d.labels)
     made = replace(d, values=values, u=u, u_by={}, flags=(), labels=labels, conditions=told, studies=tuple(studies))
@@ -362,12 +363,17 @@ def together(parts: Sequence[Dataset], name: str = "") -> CfdRun:
     notes = tuple(dict.fromkeys(t if d is finest else f"{Path(d.file or d.name).name}: {t}"
                                 for d in [finest, *(d for d in runs if d is not finest)] for t in d.notes
                                 if "no grid study" not in t and (d is finest or _bare(t) not in own)))  # fmt: skip
-    joined = concat([replace(d, kind="cfd", u=d.u_by.get("random", d.u), u_by={}) for d in parts])
+    joined = concat([replace(d, kind="cfd", u=_of_its_own(d), u_by={}) for d in parts])
     name = name or f"{finest.name} and {len(parts) - 1} coarser"
     files = tuple(f for d in runs for f in d.files)
     whole = replace(finest, name=name, values=joined.values, u=joined.u, u_by={}, flags=(), labels=(),
                     provenance=about, notes=notes, files=files, studies=())  # fmt: skip
     return by_grid(whole, np.repeat(cells, [len(d) for d in parts]))
+
+
+def _of_its_own(d: Dataset) -> Mapping[str, Array]:
+    """What the points of a run are uncertain by without its grid."""
+    return d.u_by.get("random", {}) if d.u_by else d.u
 
 
 def _bare(note: str) -> str:
@@ -425,6 +431,8 @@ def merged(parts: Sequence[Dataset]) -> list[Dataset]:
 
 CELL_SIZE = re.compile(r"((cell|mesh|grid|element|base)[_ ]?(size|spacing)|dx|h)(_m)?", re.IGNORECASE)
 """Columns of a size of cells in a table of grids."""
+FEWEST = 1000.0
+"""A grid around a rotor has more cells [1]; a battery, whose cells tables of benches count, has fewer."""
 HEIGHT = re.compile(r"h(_m)?", re.IGNORECASE)
 """Of these, one that in somebody's table may be a height over ground as well."""
 
@@ -432,23 +440,27 @@ HEIGHT = re.compile(r"h(_m)?", re.IGNORECASE)
 def of_table(record: Dataset) -> Dataset:
     """Somebody's table with a column of cells or of their size, as a run on the finest grids; any other as it is.
 
-    Rows of one condition on several grids are no repeats. A table that states its uncertainties keeps its rows.
+    Rows of one condition on several grids are no repeats; rows of unlike conditions on one grid owe what a grid costs
+    elsewhere, in a table of speeds and loads. A table that states its uncertainties keeps its rows.
     """
     column = next((k for k in record.values if CELLS.search(k)), None)
     counts = column is not None
     column = column or next((k for k in record.values if CELL_SIZE.fullmatch(k)), None)
     d = named(record)
     loads = [k for k in LOADS if k in d]
-    if column is None or not loads or len(groups(d)) == len(d):
+    if column is None or not loads or any(np.isfinite(d.u[k]).any() for k in loads):
         return record
-    cells = record[column]
-    if np.unique(cells[np.isfinite(cells)]).size < 2 or any(np.isfinite(d.u[k]).any() for k in loads):
+    cells, alone = record[column], len(groups(d)) == len(d)
+    known = np.unique(cells[np.isfinite(cells)])
+    several = {k for k, v in record.texts.items() if k.lower() in CONDITIONS and len({*v}) > 1}
+    more = [k for k in d.values if k not in (*LOADS, *_SAME) and not channel_fault(k)]  # which a run has no place for
+    if (several or more or not counts or known.size != 1 or known[0] < FEWEST) if alone else known.size < 2:
         return record
     unit = "m" if column.endswith("_m") else ""
     if HEIGHT.fullmatch(column):
         note = f"{column}: a height, or the size of cells? A grid study takes it from a column headed cell_size"
         return replace(record, notes=(*record.notes, note))
-    told = {k.lower(): v[0] for k, v in record.texts.items() if k.lower() in CONDITIONS and len({*v}) == 1}
+    told = {k.lower(): v[0] for k, v in record.texts.items() if k.lower() in CONDITIONS and k not in several}
     values = {k: v for k, v in d.values.items() if k in (*LOADS, *_SAME)}
     made = CfdRun("cfd", record.name, values, provenance={**record.provenance, "format": "cfd_run"},
                   notes=record.notes, files=(record.file,), conditions=told)  # fmt: skip

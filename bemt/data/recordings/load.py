@@ -278,7 +278,7 @@ def runs_of(
     runs, exports = _runs_and_exports(names, insist)
     if insist and not exports:
         hint = "A run.toml has its own" if runs else "Name the files, or the folder that holds them (postProcessing)"
-        hint += "" if runs else "; a table of CFD points says so by a column turbulence, cells or solver"
+        hint += "" if runs else "; a table of CFD points says so by a column cells"
         got = "no export of CFD, which options of a run are about"
         raise InputError([Fault(name, "", got, "exports of a CFD run", hint) for name in names])
     if not exports:

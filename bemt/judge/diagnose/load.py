@@ -72,7 +72,10 @@ def load(
     from bemt.data.recordings.reduce import reduce, reduction
 
     if imported is None:
-        imported = run_at(path, rpm, airspeed_m_s) or import_file(path)
+        imported = run_at(path, rpm, airspeed_m_s)
+    if imported is None:
+        imported = import_file(path)
+        imported = filled(imported, rpm, airspeed_m_s, density_kg_m3) if is_run(imported) else imported
     if not is_run(imported):
         _one_setup(imported, path)
         one_rotor(imported, path, "`compare A B --rows-b rotor={} --case CASE` takes one of them")
@@ -249,14 +252,17 @@ _File = tuple[Any, "Case", dict[str, float | None]]
 
 def _on_grids(files: Sequence[_File]) -> list[tuple[Any, Case, dict[str, float | None], Dataset | None]]:
     """Files with the CFD run that each is; runs of one condition on several grids are one study, no repeats."""
-    from bemt.data.recordings.cfd_run import run_at
+    from bemt.data.recordings.cfd_run import run_at, run_of
     from bemt.data.recordings.grid_study import are_grids, together
 
     runs: dict[int, Dataset] = {}
     for i, (path, _, told) in enumerate(files if len(files) > 1 else ()):
         with suppress(InputError):  # said where it is loaded
-            if isinstance(path, str) and (run := run_at(path, told["rpm"], told["airspeed_m_s"])) is not None:
-                runs[i] = run
+            if isinstance(path, str):
+                run = run_at(path, told["rpm"], told["airspeed_m_s"])
+                if run is None and {*told.values()} == {None}:
+                    run = run_of(path)
+                runs |= {} if run is None else {i: run}
     out, taken = [], set[int]()
     for i, file in enumerate(files):
         if i in taken:
