@@ -110,8 +110,9 @@ def _table(path: Path, kind: str | None) -> Any:
     """Content of a file, read again only when it has changed."""
     from bemt.data import readers as importers
 
-    held = path.read_bytes() if path.is_file() else None
-    return _TABLES.get((path.as_posix(), kind, held), lambda: importers.read(path, kind))
+    if not path.is_file():
+        return importers.read(path, kind)  # which says what is wrong
+    return _TABLES.get((path.as_posix(), kind, path.read_bytes()), lambda: importers.read(path, kind))
 
 
 def _duct_flow(case: Case, rotor: Rotor) -> DuctFlow | None:
