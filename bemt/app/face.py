@@ -23,9 +23,7 @@ from bemt.base.action import (
     cells_of,
     check_counts,
     choices_of,
-    converted,
     did_you_mean,
-    in_another_unit,
 )
 from bemt.base.errors import EXIT_OK
 
@@ -273,33 +271,16 @@ def _fault(one: Option, got: str, expected: str) -> Exception:
 def parsed(function: Callable[..., Any], argv: Sequence[str], prog: str = "bemt") -> argparse.Namespace:
     """Words of a command line, by the parameters of its action."""
     typed = registry.renamed(about(function).command, argv, {p.option for p in parameters(function)}, complain)
-    typed = _in_own_units(typed, parameters(function))
+    known = parameters(function)
+    if {w.partition("=")[0].lower() for w in typed if w.startswith("--")} - {p.option.lower() for p in known}:
+        from bemt.base.other_units import words_in_own_units
+
+        typed = words_in_own_units(typed, {p.option: p.name for p in known if p.kind == "number"})
     if "--help-all" in typed:
         parser_of(function, prog, everything=True).print_help()
         raise SystemExit(EXIT_OK)
     found: argparse.Namespace = parser_of(function, prog).parse_args(typed)
     return found
-
-
-def _in_own_units(argv: Sequence[str], known: Sequence[Option]) -> list[str]:
-    """Words in which ``--diameter-in 10`` is ``--diameter-m 0.254`` where the action counts in metres."""
-    numbers, names = [p for p in known if p.kind == "number"], {p.option.lower() for p in known}
-    out, told, own = [], "", None
-    for word in argv:
-        head, mark, value = word.partition("=")
-        if word.startswith("--"):
-            told = head[2:].replace("-", "_")
-            owns = None if head.lower() in names else in_another_unit(told, [p.name for p in numbers])
-            own = next((p for p in numbers if p.name == owns), None)
-            if own is not None:
-                out.append(own.option)
-                word = value
-                if not mark:
-                    continue
-        with suppress(ValueError):
-            word = word if own is None else repr(converted(float(word), told, own.name))
-        out.append(word)
-    return out
 
 
 def run(function: Callable[..., Any], argv: Sequence[str], prog: str = "bemt") -> int:

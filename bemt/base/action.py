@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 from bemt.base.errors import EXIT_OK, Fault, InputError, refuse
-from bemt.base.units import convert, split_suffix
 
 __all__ = [
     "Answered", "Declaration", "Cells", "Count", "Told", "about", "action", "choices_of", "did_you_mean", "in_words",
@@ -133,9 +132,10 @@ def worded(function: Callable[P, T]) -> Callable[P, T]:
 
     @functools.wraps(function)
     def call(*args: P.args, **more: P.kwargs) -> T:
-        for name in [name for name in more if name not in names]:
-            if (own := in_another_unit(name, names)) is not None and own not in more:
-                more[own] = converted(more.pop(name), name, own)
+        if any(name not in names for name in more):
+            from bemt.base.other_units import in_own_units
+
+            in_own_units(more, names)
         if unknown := [name for name in more if name not in names]:
             near = did_you_mean(unknown[0], names) or f" It takes {', '.join(n for n in names if n != 'self')}."
             raise TypeError(f"{function.__name__}() got {unknown[0]!r}.{near}")
@@ -149,33 +149,6 @@ def worded(function: Callable[P, T]) -> Callable[P, T]:
             return function(*first, **named)
 
     return call
-
-
-def in_another_unit(name: str, names: Iterable[str]) -> str | None:
-    """Parameter that has the quantity of a name in another unit.
-
-    >>> in_another_unit("diameter_in", ["rpm", "diameter_m"]), in_another_unit("diameter_kg", ["diameter_m"])
-    ('diameter_m', None)
-    """
-    stem, unit = split_suffix(name)
-    for own in names if unit is not None else ():
-        of, known = split_suffix(own)
-        if of == stem and known is not None and unit is not None and known.dimension == unit.dimension:
-            return own
-    return None
-
-
-def converted(value: Any, name: str, own: str) -> Any:
-    """Number or numbers in the unit of one parameter in that of another.
-
-    >>> converted([10, 20], "diameter_in", "diameter_m")
-    [0.254, 0.508]
-    """
-    unit, to = (split_suffix(word)[1] for word in (name, own))
-    assert unit is not None and to is not None
-    if value is None or isinstance(value, (list, tuple)):
-        return value and [converted(one, name, own) for one in value]
-    return convert(value, unit.suffix, to.suffix)
 
 
 def cells_of(value: Any) -> Any:

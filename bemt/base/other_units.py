@@ -1,0 +1,72 @@
+"""A quantity in another unit that its suffix names: ``--diameter-in 10`` where an action counts in ``diameter_m``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, MutableMapping, Sequence
+from contextlib import suppress
+from typing import Any
+
+from bemt.base.units import convert, split_suffix
+
+
+def own_name(name: str, names: Iterable[str]) -> str | None:
+    """Parameter that has the quantity of a name in another unit.
+
+    >>> own_name("diameter_in", ["rpm", "diameter_m"]), own_name("diameter_kg", ["diameter_m"])
+    ('diameter_m', None)
+    """
+    stem, unit = split_suffix(name)
+    for own in () if unit is None or name in names else names:
+        of, known = split_suffix(own)
+        if of == stem and known is not None and unit is not None and known.dimension == unit.dimension:
+            return own
+    return None
+
+
+def converted(value: Any, name: str, own: str) -> Any:
+    """Number or numbers in the unit of one parameter in that of another.
+
+    >>> converted([10, 20], "diameter_in", "diameter_m")
+    [0.254, 0.508]
+    """
+    unit, to = (split_suffix(word)[1] for word in (name, own))
+    assert unit is not None and to is not None
+    if value is None or isinstance(value, (list, tuple)):
+        return value and [converted(one, name, own) for one in value]
+    return convert(value, unit.suffix, to.suffix)
+
+
+def in_own_units(given: MutableMapping[str, Any], names: Sequence[str]) -> None:
+    """Turn keywords into those of a function, in place.
+
+    >>> given = {"airspeed_km_h": 36.0}
+    >>> in_own_units(given, ["airspeed_m_s"])
+    >>> given
+    {'airspeed_m_s': 10.0}
+    """
+    for name in [name for name in given if name not in names]:
+        if (own := own_name(name, names)) is not None and own not in given:
+            given[own] = converted(given.pop(name), name, own)
+
+
+def words_in_own_units(argv: Sequence[str], known: Mapping[str, str]) -> list[str]:
+    """Words of a command line; ``known`` are its options of numbers, with their parameters.
+
+    >>> words_in_own_units(["A", "--diameter-in", "10", "--json"], {"--diameter-m": "diameter_m"})
+    ['A', '--diameter-m', '0.254', '--json']
+    """
+    out, told, own = list[str](), "", None
+    for word in argv:
+        head, mark, value = word.partition("=")
+        if word.startswith("--"):
+            told = head[2:].replace("-", "_")
+            own = next((option for option, name in known.items() if name == own_name(told, known.values())), None)
+            if own is not None:
+                out.append(own)
+                word = value
+                if not mark:
+                    continue
+        with suppress(ValueError):
+            word = word if own is None else repr(converted(float(word), told, known[own]))
+        out.append(word)
+    return out
