@@ -17,14 +17,7 @@ from typing import Any
 
 from bemt.app import registry
 from bemt.app.registry import complain, progress
-from bemt.base.action import (
-    Declaration,
-    about,
-    cells_of,
-    check_counts,
-    choices_of,
-    did_you_mean,
-)
+from bemt.base.action import Declaration, about, cells_of, check_counts, choices_of, did_you_mean
 from bemt.base.errors import EXIT_OK
 
 PROGRESS = "progress"
@@ -270,8 +263,8 @@ def _fault(one: Option, got: str, expected: str) -> Exception:
 
 def parsed(function: Callable[..., Any], argv: Sequence[str], prog: str = "bemt") -> argparse.Namespace:
     """Words of a command line, by the parameters of its action."""
-    typed = registry.renamed(about(function).command, argv, {p.option for p in parameters(function)}, complain)
     known = parameters(function)
+    typed = registry.renamed(about(function).command, argv, {p.option for p in known}, complain)
     if {w.partition("=")[0].lower() for w in typed if w.startswith("--")} - {p.option.lower() for p in known}:
         from bemt.base.other_units import words_in_own_units
 

@@ -24,7 +24,7 @@ def own_name(name: str, names: Iterable[str]) -> str | None:
 
 
 def converted(value: Any, name: str, own: str) -> Any:
-    """Number or numbers in the unit of one parameter in that of another.
+    """Number or numbers in the unit of one parameter in that of another; TypeError for a word.
 
     >>> converted([10, 20], "diameter_in", "diameter_m")
     [0.254, 0.508]
@@ -33,6 +33,8 @@ def converted(value: Any, name: str, own: str) -> Any:
     assert unit is not None and to is not None
     if value is None or isinstance(value, (list, tuple)):
         return value and [converted(one, name, own) for one in value]
+    if isinstance(value, str):
+        raise TypeError(f"{name}: got {value!r}; expected a number")
     return convert(value, unit.suffix, to.suffix)
 
 

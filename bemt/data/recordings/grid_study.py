@@ -431,7 +431,7 @@ def merged(parts: Sequence[Dataset]) -> list[Dataset]:
 
 CELL_SIZE = re.compile(r"((cell|mesh|grid|element|base)[_ ]?(size|spacing)|dx|h)(_m)?", re.IGNORECASE)
 """Columns of a size of cells in a table of grids."""
-FEWEST = 1000.0
+FEWEST_CELLS = 1000.0
 """A grid around a rotor has more cells [1]; a battery, whose cells tables of benches count, has fewer."""
 HEIGHT = re.compile(r"h(_m)?", re.IGNORECASE)
 """Of these, one that in somebody's table may be a height over ground as well."""
@@ -450,11 +450,15 @@ def of_table(record: Dataset) -> Dataset:
     loads = [k for k in LOADS if k in d]
     if column is None or not loads or any(np.isfinite(d.u[k]).any() for k in loads):
         return record
-    cells, alone = record[column], len(groups(d)) == len(d)
+    cells = record[column]
     known = np.unique(cells[np.isfinite(cells)])
     several = {k for k, v in record.texts.items() if k.lower() in CONDITIONS and len({*v}) > 1}
-    more = [k for k in d.values if k not in (*LOADS, *_SAME) and not channel_fault(k)]  # which a run has no place for
-    if (several or more or not counts or known.size != 1 or known[0] < FEWEST) if alone else known.size < 2:
+    if len(groups(d)) < len(d):  # a condition on several grids, or read twice on one
+        of_grids = known.size > 1
+    else:
+        lost = [k for k in d.values if k not in (*LOADS, *_SAME) and not channel_fault(k)]  # a run has no place for it
+        of_grids = counts and known.size == 1 and known[0] >= FEWEST_CELLS and not several and not lost
+    if not of_grids:
         return record
     unit = "m" if column.endswith("_m") else ""
     if HEIGHT.fullmatch(column):

@@ -251,18 +251,19 @@ _File = tuple[Any, "Case", dict[str, float | None]]
 
 
 def _on_grids(files: Sequence[_File]) -> list[tuple[Any, Case, dict[str, float | None], Dataset | None]]:
-    """Files with the CFD run that each is; runs of one condition on several grids are one study, no repeats."""
-    from bemt.data.recordings.cfd_run import run_at, run_of
+    """Files with what was read of each; CFD runs of one condition on several grids are one study, no repeats."""
+    from bemt.data.recordings.cfd_run import is_run, run_at
     from bemt.data.recordings.grid_study import are_grids, together
+    from bemt.data.recordings.load import import_file
 
-    runs: dict[int, Dataset] = {}
+    read: dict[int, Dataset] = {}
     for i, (path, _, told) in enumerate(files if len(files) > 1 else ()):
         with suppress(InputError):  # said where it is loaded
             if isinstance(path, str):
                 run = run_at(path, told["rpm"], told["airspeed_m_s"])
-                if run is None and {*told.values()} == {None}:
-                    run = run_of(path)
-                runs |= {} if run is None else {i: run}
+                if run is not None or {*told.values()} == {None}:
+                    read[i] = import_file(path) if run is None else run
+    runs = {i: run for i, run in read.items() if is_run(run)}
     out, taken = [], set[int]()
     for i, file in enumerate(files):
         if i in taken:
@@ -272,7 +273,7 @@ def _on_grids(files: Sequence[_File]) -> list[tuple[Any, Case, dict[str, float |
             if k in runs and files[k][1] is file[1] and are_grids([runs[j] for j in (*group, k)]):
                 group.append(k)
         taken |= {*group}
-        out.append((*file, together([runs[j] for j in group]) if len(group) > 1 else runs.get(i)))
+        out.append((*file, together([runs[j] for j in group]) if len(group) > 1 else read.get(i)))
     return out
 
 

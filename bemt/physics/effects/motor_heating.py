@@ -24,8 +24,7 @@ class MotorHeating(Effect):
     time constant (declared): tau d(dT)/dt = c (Q / Qmax)^2 - dT, from cold, with c such that the warmest point of the
     recording is warmer by ``rise_K``. The magnets are another body (thermal networks: Mellor, Roberts and Turner 1991,
     IEE Proc. B 138:205; not checked) that warms as much, ``magnets`` times as slowly (declared). Between runs on one
-    clock the motor is stopped and cools; a restarted clock
-    starts cold. Loads at the measured speed are unchanged.
+    clock the motor is stopped and cools; a restarted clock starts cold. Loads at the measured speed are unchanged.
     """
 
     rise_K: float = 40.0
