@@ -611,7 +611,7 @@ def test_the_fan_of_the_thesis_goes_the_whole_road(
     (result,) = json.loads(capsys.readouterr().out)["cases"]
     (row,) = [r for r in result["rows"] if r["source"] == "cfd" and r["origin"] == "run.toml"]
     assert row["thrust_N"] == pytest.approx(23.5, rel=1e-3) and row["torque_Nm"] == pytest.approx(0.285, rel=1e-3)
-    assert any(a["reference"] == row["label"] for a in result["audit"])
+    assert f"cfd {row['origin']}" in [a["reference"] for a in result["audit"]], "one audit a run, by its file"
     assert main(["report", str(case), "--out", "page", "--quiet"]) == 0
     assert "run.toml" in next(Path("page").glob("*.html")).read_text()
 
