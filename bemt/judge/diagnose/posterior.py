@@ -164,7 +164,7 @@ def weigh(
     before = knowledge.log_priors(weights, pairs, knowledge.kinds(problem), alone)
     rough = {c.id for c in candidates if problem.by_laws and effects.catalogue()[c.id].kind != "stand"
              and not effects.catalogue()[c.id].exact}  # fmt: skip
-    probability = _posterior(states, before, rough)
+    probability = _posterior(states, before, rough, _stated(problem, candidates))
     likeliest = max(probability, key=lambda k: probability[k])
     states.sort(key=lambda s: -(s.log_z[likeliest] + np.log(s.hyper.weight)))
     prior = {k: math.exp(v) for k, v in before.items()}
@@ -223,6 +223,18 @@ def _told(candidates: Sequence[Candidate]) -> list[str]:
     return [v for v, i in along if i in tried and [w for w, _ in along].count(v) == 1]
 
 
+def _stated(problem: Problem, candidates: Sequence[Candidate]) -> set[str]:
+    """Effects by laws that the case has on, over a variable that was varied: what is left of these is no cause.
+
+    A recorded wall is not left out. Where the readings ask for more of it, its published law is off.
+    """
+    on = frozenset[str].intersection(*(frozenset(e.id for e in p.baseline) for p in problem.parts))
+    varied = {v for v in _told(candidates) if v in problem.covariates and np.ptp(problem.covariates[v]) > 0.0}
+    catalogue = effects.catalogue()
+    laws = {c.id: catalogue[c.id].law or c.id for c in candidates}
+    return {i for i, law in laws.items() if law in on and varied & set(catalogue[law].along)}
+
+
 def _leading(bank: _Bank) -> list[Hyper]:
     """Settings of the covariance under which some explanation is best, and the best of none and of one effect.
 
@@ -269,16 +281,17 @@ def _single(bank: _Bank, h: Hyper, white: Conditional) -> State:
     state = State(h, white, r, S, 0.5 * np.sum(S * S, axis=0), log_z={NONE: none})
     gain = S.T @ r - state.half + bank.log_w
     for name, span in bank.spans.items():
-        total, best = gain[span], int(np.argmax(gain[span]))
+        counts = bank.seen[span]
+        among = np.flatnonzero(counts if counts.any() else ~counts)
+        total, best = gain[span], int(among[np.argmax(gain[span][among])])
         for _ in range(2):  # the error of the law follows the size of the best setting, which depends on it
             width, columns = bank.columns(name, best)
             law = form.LawError.of(white.changes(columns), width)
             total = gain[span] + law.gain(r[:, None] - S[:, span])
-            if (again := int(np.argmax(total))) == best:
+            if (again := int(among[np.argmax(total[among])])) == best:
                 break
             best = again
         state.forms[name] = law.at(r - S[:, span.start + best])
-        counts = bank.seen[span]
         state.log_z[Explanation.of(name)] = none + (float(log_sum(total[counts])) if counts.any() else _SHUT)
         # the error of a law is a share of what it changes
         state.small[Explanation.of(name)] = none + (float(log_sum(gain[span][~counts])) if not counts.all() else _SHUT)
@@ -326,9 +339,11 @@ def _pairs(bank: _Bank, state: State) -> None:
 
 
 def _posterior(
-    states: Sequence[State], before: dict[Explanation, float], rough: Collection[str] = ()
+    states: Sequence[State], before: dict[Explanation, float], rough: Collection[str], stated: Collection[str]
 ) -> dict[Explanation, float]:  # fmt: skip
     """Probabilities: what is too small to count is none, a second effect that adds too little is not there.
+
+    What is ``stated`` is not left out.
 
     Evidence between ``rough`` laws is tempered: they are off by a share of what they explain, so that they are told
     apart by no less than that share of the log odds (a power likelihood, as for any model that is known to be wrong).
@@ -354,4 +369,6 @@ def _posterior(
         if plain[k] < plain[better] + EARNED:
             out[better] += out[k]
             out[k] = 0.0
+    for k in [k for k in out if k.ids & set(stated)]:
+        out[Explanation.of(*(k.ids - set(stated)))] += out.pop(k)
     return out

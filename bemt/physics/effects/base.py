@@ -419,6 +419,8 @@ class Effect:
     sensor: ClassVar[str] = ""
     # Covariates along which it shows first, of those that a diagnosis knows (J, rpm, Re, M_tip, time_s, ...).
     along: ClassVar[tuple[str, ...]] = ()
+    # Effect whose law it is, at another size than stated.
+    law: ClassVar[str] = ""
     # Whether only a change of speed shows it: not steady points.
     transient: ClassVar[bool] = False
     # Law of a flow without friction and compressibility: by similarity (Buckingham 1914) its dimensionless form may

@@ -21,6 +21,7 @@ class WiderGap(Effect):
     extra_mm: float = 0.5
 
     id = "wider_gap"
+    law = "tip_gap"
     torque_open = True
     inviscid = True
     title = "wrong tip gap"
