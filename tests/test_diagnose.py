@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from diagnosing import case, diagnose, left_out, points, recording
 
-from bemt.judge.diagnose import assemble, chain, document, figures, noise, plan, record, signatures
-from bemt.judge.explanation import UNKNOWN
+from bemt.judge.diagnose import assemble, chain, document, figures, form, noise, plan, posterior, record, signatures
+from bemt.judge.explanation import UNKNOWN, Explanation
 from bemt.physics import effects
 from bemt.physics.dataset import Dataset
 
@@ -119,6 +119,40 @@ def test_a_wall_with_a_law_of_its_own_is_the_wall() -> None:
     answer = diagnose(recording(case(), given, (Tube(),)), case())
     assert answer.decision.effects == ("ground_effect",), document.text(answer)
     assert answer.found.probability[UNKNOWN] < 0.01
+
+
+class Strong(Tube):
+    """Four times as much of it."""
+
+    def relief(self, z_over_R: np.ndarray) -> np.ndarray:
+        return 4.0 * super().relief(z_over_R)
+
+
+WALL = dict(points("static")) | {"wall_distance_m": np.tile([0.07, 0.1, 0.15, 0.3, 0.8], 4)[:17]}
+BEFORE_A_WALL = case().replaced({"model.effects_on": ["ground_effect"]})
+
+
+def test_more_of_a_wall_that_the_case_has_on_is_the_error_of_its_law() -> None:
+    """A recorded wall was not left out, however far its published law is off."""
+    answer = diagnose(recording(BEFORE_A_WALL, WALL, (Strong(),), noise=0.003), BEFORE_A_WALL)
+    assert answer.found.log_bayes(Explanation.of("ground_effect")) > 5.0
+    assert not answer.decision.effects, document.text(answer)
+
+
+@pytest.mark.parametrize("walls", [[0.07, 0.1, 0.15, 0.3, 0.8], [0.12, 0.16, 0.2, 0.3, 0.8]])
+def test_an_instrument_that_changes_nothing_is_no_evidence(walls: list[float]) -> None:
+    """Nor where the settings that fit best are too small to count, as those of a wall farther away."""
+    given = WALL | {"wall_distance_m": np.tile(walls, 4)[:17]}
+    built = assemble.build([record.from_series(recording(BEFORE_A_WALL, given, noise=0.002), BEFORE_A_WALL)],
+                           [BEFORE_A_WALL])  # fmt: skip
+    found, _ = signatures.candidates(built, ["ground_effect", "cross_talk"])
+    wall, both = Explanation.of("ground_effect"), Explanation.of("ground_effect", "cross_talk")
+    (ground,) = (c for c in found if c.id == "ground_effect")
+    largest = int(np.argmax(np.sum(ground.signatures**2, axis=0)))
+    width, error = form.columns(built, ground, largest, form.form_modes(built, found)["ground_effect"])
+    for column in (*error[:, :width].T, *-error[:, :width].T):
+        weighed = posterior.weigh(replace(built, y=built.f0 + 0.6 * column), found)
+        assert weighed.log_bayes(both, over=wall) < 0.0
 
 
 FAINT = pytest.mark.xfail(strict=True, reason="a change below 1 % counts as none")
