@@ -370,3 +370,27 @@ def test_far_beyond_zero_thrust_the_band_is_wider_than_the_value_and_not_to_be_t
     hover, flight, beyond, _ = truth
     assert not hover[4] and not flight[4] and hover[1] < 0.3 * hover[0]
     assert beyond[1] > abs(beyond[0]) and "do not trust" in " ".join(beyond[4])
+
+
+@pytest.mark.parametrize(
+    ("rotor", "reading"), [("APC 10x5E", None), ("10x5MR", None), ("5x4x3", None), ("10x5", "rpm=8000,thrust_g=900")]
+)
+def test_a_name_a_suffix_and_a_reading_give_one_rotor_at_every_door(
+    rotor: str, reading: str | None, tmp_path: Path
+) -> None:
+    rpm = 8000.0
+    truth = bemt.estimate(rotor, rpm, reading=reading).to_dict()["rows"][0]["thrust_N"]
+    if reading is not None:
+        assert truth != pytest.approx(bemt.estimate(rotor, rpm).to_dict()["rows"][0]["thrust_N"], rel=0.01)
+    bemt.new(rotor, reading=reading, out=tmp_path / "case")
+    written = load_case(tmp_path / "case")
+    assert bemt.propeller(rotor, reading=reading).solve(rpm, bands=False).thrust_N[0] == pytest.approx(truth, rel=1e-9)
+    assert propagate(written, rpm, 0.0, bands=False).points.thrust_N[0] == pytest.approx(truth, rel=1e-9)
+
+    def lifts(speed: float) -> float:
+        return float(bemt.estimate(rotor, speed, reading=reading).to_dict()["rows"][0]["thrust_N"])
+
+    full = {k: band.value for k, band in bemt.drive(rotor, kv=1000, cells=3, reading=reading).full.items()}
+    assert full["thrust_N"] == pytest.approx(lifts(full["rpm"]), rel=2e-3)
+    first = bemt.choose(0.6 * truth, 4, labels=rotor, reading=reading).table.iloc[0]
+    assert lifts(first.rpm) == pytest.approx(0.6 * truth, rel=2e-3)

@@ -21,6 +21,7 @@ from bemt.physics.bem.coaxial import LOADS, RATIOS
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case import Case, case_of, find_cases, fresh, load_case
 from bemt.rotors.case.lattice import conditions, turned
+from bemt.rotors.case.reading import reading_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -469,7 +470,7 @@ def _size_faults(told: Mapping[str, tuple[float, float]], label: str | None) -> 
 def propeller(
     label: str | None = None, *, stations: str | os.PathLike[str] | None = None, diameter_m: float | None = None,
     diameter_in: float | None = None, diameter_mm: float | None = None, blades: int | None = None,
-    rpm: float | None = None, airspeed_m_s: float = 0.0,
+    rpm: float | None = None, airspeed_m_s: float = 0.0, reading: str | Mapping[str, float] | None = None,
 ) -> Propeller:  # fmt: skip
     """Create a propeller from a label or from a file of blade stations.
 
@@ -488,6 +489,8 @@ def propeller(
         Default speed of :meth:`Propeller.solve`. [rev/min]
     airspeed_m_s : float
         Default airspeed of :meth:`Propeller.solve`. [m/s]
+    reading : str or mapping, optional
+        With a label: one reading of this propeller, or several: ``rpm=5400,thrust_g=410``.
 
     Returns
     -------
@@ -527,10 +530,13 @@ def propeller(
         stations = path_text("stations", stations)
     rpm = None if rpm is None else number("rpm", rpm)
     airspeed_m_s = number("airspeed_m_s", airspeed_m_s)
+    if stations is not None and reading is not None:
+        faults.append(Fault("", "reading", "with stations", "a label"))
     faults += _size_faults(told, label)
     refuse(faults)
     if label is not None:
-        text = fresh.label_text(label, blades, rpm, airspeed_m_s)
+        told_by = None if reading is None else reading_text(reading)
+        text = fresh.label_text(label, blades, rpm, airspeed_m_s, reading=told_by)
         return Propeller(case_of(text), text)
     assert stations is not None
     ((value, unit),) = told.values()

@@ -30,7 +30,8 @@ def choose(
     mass_kg: float | None = None, rest_kg: float | None = None, rotors: Count = 1, airspeed_m_s: float = 0.0,
     max_diameter_in: float | None = None, arm_mm: float | None = None, max_tip_mach: float = 0.8,
     capacity_Ah: float | None = None, minutes: float | None = None, fan: bool = False,
-    fluid: Literal["air", "water"] = "air", coaxial: bool = False, sure: float = 0.9, out: Path | None = None,
+    fluid: Literal["air", "water"] = "air", coaxial: bool = False, reading: str | None = None, sure: float = 0.9,
+    out: Path | None = None,
 ) -> DriveChoice:  # fmt: skip
     """Find which propeller and which motor constant reach a thrust, with the probability that they do.
 
@@ -74,6 +75,8 @@ def choose(
         What the propeller turns in; in water, too little blade area for the thrust is named: it may cavitate.
     coaxial : bool
         Each propeller is one of a pair, one above the other.
+    reading : str, optional
+        One reading of the propeller, of which the label is given: ``rpm=5400,thrust_g=410``.
     sure : float
         Probability from which on a pair counts as sure.
     out : path, optional
@@ -102,7 +105,7 @@ def choose(
     from bemt.tools.design.answer import DriveChoice
 
     target = search.target_of(thrust_N, cells, mass_kg, rest_kg, rotors, airspeed_m_s, max_tip_mach, capacity_Ah,
-                              minutes, fan, fluid, coaxial, arm_mm)  # fmt: skip
+                              minutes, fan, fluid, coaxial, arm_mm, reading)  # fmt: skip
     found = DriveChoice(*search.choose(target, kv, motors, labels, blades, max_diameter_in, sure), sure)
     if out is not None:
         found.write(path_text("out", out))

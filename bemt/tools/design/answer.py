@@ -72,7 +72,9 @@ class DriveChoice(Answered):
     def _document(self) -> dict[str, Any]:
         """``bemt.choose/1``; all pairs, best first."""
         pairs, on_sale = (table.to_dict("records") for table in (self.table, self.on_sale))
-        return {"schema": SCHEMA, "target": vars(self.target), "sure": self.sure, "pairs": pairs, "on_sale": on_sale}
+        target = {**vars(self.target), **vars(self.target.use)}
+        del target["use"]
+        return {"schema": SCHEMA, "target": target, "sure": self.sure, "pairs": pairs, "on_sale": on_sale}
 
     @property
     def text(self) -> str:
@@ -80,8 +82,8 @@ class DriveChoice(Answered):
         t, good = self.target, len(self.good)
         at = "this thrust" if t.cruise_N is None else f"hover of {self.table.mass_kg.iloc[0]:.3g} kg"
         size = "" if t.airspeed_m_s == 0.0 else f" at {t.airspeed_m_s:g} m/s"
-        fluid = "" if t.fluid == "air" else ", in water"
-        pair = ", each one of a coaxial pair" if t.coaxial else ""
+        fluid = "" if t.use.fluid == "air" else ", in water"
+        pair = ", each one of a coaxial pair" if t.use.coaxial else ""
         what = f"{t.thrust_N:.3g} N"
         if t.mass_kg is not None and not t.fixed:
             what = f"{t.mass_kg:.3g} kg on {number_of(t.rotors, 'rotor')}"
@@ -156,7 +158,7 @@ class DriveChoice(Answered):
     def _stock(self) -> list[str]:
         """Motors on sale for the first propeller, and where they come from."""
         t, first = self.target, self.table.iloc[0]
-        if not t.sized or t.fluid != "air" or first.probability < self.sure:
+        if not t.sized or t.use.fluid != "air" or first.probability < self.sure:
             return []
         if not (known := len(motors_on_sale())):
             return ["", 'Motors on sale by name: pip install "bemt[motors]"']

@@ -77,25 +77,38 @@ PAIR_SPACING = 0.2
 """Distance of the disks of a coaxial pair over the diameter: declared [1]."""
 
 
+@dataclass(frozen=True)
+class Use:
+    """What a label turns in, whether a second one turns downstream, and what it was read to do."""
+
+    fluid: str = "air"
+    coaxial: bool = False
+    reading: str | None = None  # As `bemt.rotors.case.reading.parse_reading` takes it
+
+
+ALONE = Use()
+
+
 @lru_cache(maxsize=512)
-def case_of_label(label: str, fluid: str = "air", coaxial: bool = False) -> Case:
-    """Case of a label, or of a fan, with its declared unknowns; in water; with a second one downstream."""
-    text = fresh.fan_text(size_in(label) * INCH) if label.startswith(FAN) else fresh.label_text(label)
+def case_of_label(label: str, use: Use = ALONE) -> Case:
+    """Case of a label, or of a fan, with its declared unknowns."""
+    fan = label.startswith(FAN)
+    text = fresh.fan_text(size_in(label) * INCH) if fan else fresh.label_text(label, reading=use.reading)
     case = case_of(text, ends=False)
     changes: dict[str, Any] = {}
-    if fluid == "water":
+    if use.fluid == "water":
         kept = [a for a in case.written.get("assumptions", []) if not a["key"].startswith("air.")]
         changes = {"air": {"fluid": "water"}, "assumptions": kept, "operating.rpm": 1000.0}
-    if coaxial:
+    if use.coaxial:
         changes |= {"second_rotor": {"z_over_D": PAIR_SPACING}}
     return with_changes(case, changes) if changes else case
 
 
 def rotor_loads(
-    label: str, rpm_max: float, airspeed_m_s: float, air: Air | None = None, fluid: str = "air", coaxial: bool = False
+    label: str, rpm_max: float, airspeed_m_s: float, air: Air | None = None, use: Use = ALONE
 ) -> RotorLoads | None:
     """Solve a label over speed; None where too few speeds converge. Of a coaxial pair each rotor has half."""
-    case = case_of_label(label, fluid, coaxial)
+    case = case_of_label(label, use)
     found = loads_of_case(label, case, rpm_max, airspeed_m_s, air)
     if found is None or not airspeed_m_s:
         return found
@@ -142,17 +155,17 @@ def _keller_N(case: Case) -> float:
     return ratio * ROOM_PA * D**2 / (1.3 + 0.3 * B)
 
 
-def scatter(label: str, rpm: float, airspeed_m_s: float, fluid: str = "air", coaxial: bool = False) -> LoadScatter:
+def scatter(label: str, rpm: float, airspeed_m_s: float, use: Use = ALONE) -> LoadScatter:
     """Bands of a label near a speed, by `bemt.rotors.case.propagate`: declared unknowns, model and numerics.
 
     Relative bands hardly depend on the speed: it is taken to the next power of `SPEED_STEP`, and the band kept.
     """
-    return _scatter(label, SPEED_STEP ** round(math.log(rpm, SPEED_STEP)), airspeed_m_s, fluid, coaxial)
+    return _scatter(label, SPEED_STEP ** round(math.log(rpm, SPEED_STEP)), airspeed_m_s, use)
 
 
 @lru_cache(maxsize=512)
-def _scatter(label: str, rpm: float, airspeed_m_s: float, fluid: str, coaxial: bool) -> LoadScatter:
-    case = case_of_label(label, fluid, coaxial)
+def _scatter(label: str, rpm: float, airspeed_m_s: float, use: Use) -> LoadScatter:
+    case = case_of_label(label, use)
     found = propagate(case, rpm, airspeed_m_s)
     T, Q = (float(found.nominal[key][0]) for key in ("thrust_N", "torque_Nm"))
     u = [float(found.points.u[key][0]) for key in ("thrust_N", "torque_Nm")]
@@ -183,9 +196,7 @@ def size_in(label: str) -> float:
 SCATTERS = 4  # labels whose bands are computed; others take the nearest
 
 
-def scatters(
-    loads: Sequence[RotorLoads], thrust_N: float, airspeed_m_s: float, fluid: str, coaxial: bool
-) -> list[LoadScatter]:
+def scatters(loads: Sequence[RotorLoads], thrust_N: float, airspeed_m_s: float, use: Use) -> list[LoadScatter]:
     """Bands of a few labels spread over the sizes that reach the target."""
     good = [one for one in loads if np.isfinite(one.speed_for(np.array([thrust_N]))[0])] or list(loads)
     order = sorted(good, key=lambda one: (one.diameter_m, one.pitch_m))
@@ -193,8 +204,7 @@ def scatters(
     out = []
     for i in sorted(picked):
         rpm = float(order[i].speed_for(np.array([thrust_N]))[0])
-        found = scatter(order[i].label, rpm if math.isfinite(rpm) else float(order[i].rpm[-1]),
-                                    airspeed_m_s, fluid, coaxial)  # fmt: skip
+        found = scatter(order[i].label, rpm if math.isfinite(rpm) else float(order[i].rpm[-1]), airspeed_m_s, use)
         if np.isfinite([found.u_thrust, found.u_torque]).all():
             out.append(found)
     if not out:

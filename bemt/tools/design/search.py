@@ -102,8 +102,7 @@ class Target:
     rest_kg: float | None = None
     told_rest: bool = False
     fixed: bool = True  # Whether the thrust is asked for, not twice that of hover
-    fluid: str = "air"
-    coaxial: bool = False
+    use: rotor_loads.Use = rotor_loads.ALONE
     fan: bool = False
     sized: bool = True  # Whether motors are as large as the thrust asks for, else those of a list
     arm_m: float | None = None  # Of the frame, which leaves room for the largest diameter [m]
@@ -112,7 +111,7 @@ class Target:
     @property
     def arms(self) -> int:
         """Arms that carry the rotors."""
-        return self.rotors // 2 if self.coaxial else self.rotors
+        return self.rotors // 2 if self.use.coaxial else self.rotors
 
     @property
     def voc(self) -> float:
@@ -124,7 +123,7 @@ class Target:
         """Standard diameters, smallest first. [in]"""
         if self.fan:
             return [mm / 25.4 for mm in FAN_MM]
-        return WATER_DIAMETERS if self.fluid == "water" else DIAMETERS
+        return WATER_DIAMETERS if self.use.fluid == "water" else DIAMETERS
 
     @property
     def at_N(self) -> float:
@@ -157,10 +156,13 @@ def choose(
     target = dataclasses.replace(target, max_diameter_in=None if math.isinf(most) else most, sized=not known)
     machines = known or tuple(KnownMotor(f"{v:.0f} rev/min/V", float(v)) for v in kvs)
     names = _several(labels) or _standard(target, counts)
+    if target.use.reading is not None and len(names) != 1:
+        hint = "Name it with --labels"
+        raise InputError(Fault("", "--reading", f"{len(names)} propellers", "the one that gave it", hint))
     loads = [found for name in names if (found := _loads(name, target, machines)) is not None]
     if not loads:
         raise InputError(Fault("", "--labels", "none that can be solved", "a propeller that can reach the speed"))
-    spreads = rotor_loads.scatters(loads, target.thrust_N, target.airspeed_m_s, target.fluid, target.coaxial)
+    spreads = rotor_loads.scatters(loads, target.thrust_N, target.airspeed_m_s, target.use)
     near = [rotor_loads.nearest(one, spreads) for one in loads]
 
     def ranked(lifting: Target, draws: int = DRAWS) -> pd.DataFrame:
@@ -196,7 +198,7 @@ def _own(loads: RotorLoads, target: Target, asked_N: float, motor_g: float) -> t
     """Parts of one rotor for a thrust at full throttle, and their mass [kg]: two of a pair share an arm."""
     n = float(np.nan_to_num(loads.speed_for(np.array([asked_N]))[0], nan=loads.rpm[-1]))
     parts = _parts(loads, target, n, asked_N, motor_g)
-    return parts, float(parts.total - (0.5 * parts.arm if target.coaxial else 0.0))
+    return parts, float(parts.total - (0.5 * parts.arm if target.use.coaxial else 0.0))
 
 
 MAKERS = 3
@@ -208,7 +210,7 @@ def _on_sale(
 ) -> list[dict[str, Any]]:
     """The most usual motors on sale for the first propeller that are sure of the target and stand their current."""
     first = table.iloc[0]
-    if not target.sized or first.probability < sure or target.fluid != "air":
+    if not target.sized or first.probability < sure or target.use.fluid != "air":
         return []
     one = next(x for x in loads if x.label == first.label)
     even = table.kv[(table.label == first.label) & (table.probability >= 0.5)].min()
@@ -258,23 +260,24 @@ def _out_of_range(given: Mapping[str, float | None]) -> list[Fault]:
 
 
 def _clashes(
-    fluid: str, fan: bool, coaxial: bool, rotors: float, rest_kg: float | None, mass_kg: float | None
+    use: rotor_loads.Use, fan: bool, rotors: float, rest_kg: float | None, mass_kg: float | None
 ) -> Iterator[Fault]:
     """Options that do not go together."""
-    if fluid not in LOADING or fluid == "fan":
-        yield Fault("", "--fluid", repr(fluid), "air or water")
-    if fan and (coaxial or fluid == "water"):
-        yield Fault("", "--fan", "with " + ("--coaxial" if coaxial else "--fluid water"), "a fan alone in air")
+    if use.fluid not in LOADING or use.fluid == "fan":
+        yield Fault("", "--fluid", repr(use.fluid), "air or water")
+    clash = ["--coaxial"] * use.coaxial + ["--fluid water"] * (use.fluid == "water") + ["--reading"] * bool(use.reading)
+    if fan and clash:
+        yield Fault("", "--fan", f"with {clash[0]}", "a fan by its size, alone in air")
     if rest_kg is not None and mass_kg is None:
         yield Fault("", "--rest-kg", "given", "nothing without --mass-kg")
-    if coaxial and (not _is_number(rotors) or rotors % 2 != 0):
+    if use.coaxial and (not _is_number(rotors) or rotors % 2 != 0):
         yield Fault("", "--rotors", f"{rotors}", "an even number, for pairs of them", "It counts both of a pair")
 
 
 def target_of(
     thrust_N: float | None, cells: int | None, mass_kg: float | None, rest_kg: float | None, rotors: int,
     airspeed_m_s: float, max_tip_mach: float, capacity_Ah: float | None, minutes: float | None, fan: bool, fluid: str,
-    coaxial: bool, arm_mm: float | None,
+    coaxial: bool, arm_mm: float | None, reading: str | None,
 ) -> Target:  # fmt: skip
     """What is asked for; all faults at once."""
     given = {
@@ -290,7 +293,8 @@ def target_of(
     if minutes is not None and capacity_Ah is None:
         faults.append(Fault("", "--capacity-Ah", "nothing", "the battery's capacity [A h], for the time"))
     faults += [Fault("", k, repr(v), "a number") for k, v in given.items() if not (v is None or _is_number(v))]
-    refuse([*faults, *_clashes(fluid, fan, coaxial, rotors, rest_kg, mass_kg)])
+    use = rotor_loads.Use(fluid, coaxial, reading)
+    refuse([*faults, *_clashes(use, fan, rotors, rest_kg, mass_kg)])
     refuse(_out_of_range(given))
     hover, most, rest = None, thrust_N or 0.0, rest_kg
     if mass_kg is not None:
@@ -302,7 +306,7 @@ def target_of(
             raise InputError(Fault("", "--thrust-N", f"{most:g}", f"{hover:.4g} N or more", hint))
     arm_m = None if arm_mm is None else 1e-3 * arm_mm
     return Target(most, int(cells or 1), hover, airspeed_m_s, max_tip_mach, rotors, capacity_Ah, minutes, mass_kg, rest,
-                  rest_kg is not None, thrust_N is not None, fluid, coaxial, fan, True, arm_m)  # fmt: skip
+                  rest_kg is not None, thrust_N is not None, use, fan, True, arm_m)  # fmt: skip
 
 
 def _check(kv: Sequence[float], max_diameter_in: float | None, sure: float, blades: Sequence[int]) -> None:
@@ -331,7 +335,7 @@ def _no_size(target: Target, small: Sequence[float]) -> Fault:
         expected = f"{target.sizes_in[0]:.3g} in or more, the smallest {what}"
         where = "--max-diameter-in" if target.arm_m is None else "--arm-mm"
         return Fault("", where, f"room for {target.max_diameter_in:.3g} in", expected, hint)
-    least, most = LOADING["fan" if target.fan else target.fluid]
+    least, most = LOADING["fan" if target.fan else target.use.fluid]
     low, high = least * _area(small[0]), most * _area(small[-1])
     within = "" if target.max_diameter_in is None else f" within {target.max_diameter_in:.3g} in"
     expected = f"{low:.2g} to {high:.3g} N, the load of a {what} from {small[0]:.3g} to {small[-1]:.3g} in"
@@ -340,7 +344,7 @@ def _no_size(target: Target, small: Sequence[float]) -> Fault:
 
 def _standard(target: Target, blades: Sequence[int]) -> tuple[str, ...]:
     """Standard sizes whose disk loading at the target can be expected to work."""
-    least, most = LOADING["fan" if target.fan else target.fluid]
+    least, most = LOADING["fan" if target.fan else target.use.fluid]
     room = math.inf if target.max_diameter_in is None else target.max_diameter_in * (1.0 + 1e-9)
     small = [D for D in target.sizes_in if room >= D]
     fit = [D for D in small if least <= target.thrust_N / _area(D) <= most]
@@ -348,7 +352,7 @@ def _standard(target: Target, blades: Sequence[int]) -> tuple[str, ...]:
         raise InputError(_no_size(target, small))
     if target.fan:
         return tuple(f"{rotor_loads.FAN}{25.4 * D:.3g} mm" for D in fit)
-    flying = target.airspeed_m_s > 0.0 or target.fluid == "water"
+    flying = target.airspeed_m_s > 0.0 or target.use.fluid == "water"
     pairs = [(D, P) for D in fit for P in pitches_in(D, flying)]
     return tuple(f"{D:g}x{P:g}" + (f"x{B}" if B != 2 else "") for D, P in pairs for B in blades)
 
@@ -365,10 +369,10 @@ def pitches_in(diameter_in: float, flying: bool) -> tuple[float, ...]:
 
 def _loads(label: str, target: Target, machines: Sequence[KnownMotor]) -> RotorLoads | None:
     D = rotor_loads.size_in(label) * INCH
-    tip = TIP_IN_WATER if target.fluid == "water" else 0.97 * 340.0
+    tip = TIP_IN_WATER if target.use.fluid == "water" else 0.97 * 340.0
     fastest = 1.05 * max(m.kv for m in machines) * target.voc
-    return rotor_loads.rotor_loads(label, min(60.0 * tip / (math.pi * D), fastest), target.airspeed_m_s,
-                                   fluid=target.fluid, coaxial=target.coaxial)  # fmt: skip
+    most = min(60.0 * tip / (math.pi * D), fastest)
+    return rotor_loads.rotor_loads(label, most, target.airspeed_m_s, use=target.use)
 
 
 @cache
@@ -512,7 +516,7 @@ def _reasons(table: pd.DataFrame, target: Target, sure: float) -> list[str]:
             words.append(f"full throttle gives {row.full_thrust_N:.3g} N of {row.asked_N:.3g}")
         if row.tip_mach > target.max_tip_mach:
             words.append(f"tip Mach {row.tip_mach:.2f}")
-        if target.fluid == "water" and row.asked_N > row.keller_N:
+        if target.use.fluid == "water" and row.asked_N > row.keller_N:
             words.append(f"may cavitate: wants wider blades above {row.keller_N:.3g} N")
         if target.minutes is not None and row.minutes < target.minutes:
             words.append(f"{row.minutes:.1f} min")
