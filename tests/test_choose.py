@@ -56,9 +56,9 @@ def test_power_in_flight_is_above_momentum_theory() -> None:
 def test_the_first_is_the_smallest_near_the_least_power_and_the_least_is_the_second(few) -> None:
     sure = few[few.probability >= 0.9]
     first, rest = sure.iloc[0], sure.iloc[1:]
-    near = sure[sure.power_W <= 1.05 * sure.power_W.min()]
-    assert first.diameter_in == near.diameter_in.min() and first.power_W <= 1.05 * sure.power_W.min()
-    assert np.all(np.diff(rest.power_W) >= 0.0) and (few.why.iloc[1:] != "").all()
+    near = sure[sure.mean_W <= 1.05 * sure.mean_W.min()]
+    assert first.diameter_in == near.diameter_in.min() and first.mean_W <= 1.05 * sure.mean_W.min()
+    assert np.all(np.diff(rest.mean_W) >= 0.0) and (few.why.iloc[1:] != "").all()
     assert set(few.index[: len(sure)]) == set(sure.index)
 
 
