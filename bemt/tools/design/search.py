@@ -67,7 +67,7 @@ TIP_IN_WATER = 40.0
 """Tip speed to which a propeller is solved in water: it cavitates long before [m/s]."""
 POWER_BAND = 0.64
 """Standard uncertainty of the power at a thrust over the scatter of the draws: rms of the error over it, of 256
-readings of six stands (0.58) and 148 labels of UIUC at rest (0.74); 0.63 to 0.69 with a stand or a maker's family left
+readings of six stands (0.58) and 149 labels of UIUC at rest (0.73); 0.63 to 0.69 with a stand or a maker's family left
 out. The bands of thrust and torque are wider than labels err at rest (docs/choose_benches.py) [1]."""
 NEAR = 0.05
 """The smallest within this share of the least power comes first: the optimum is flat, and no label is known better."""
