@@ -276,7 +276,8 @@ def test_motors_on_sale_are_named_where_their_list_is_installed() -> None:
     light, heavy = sorted(stock, key=lambda row: row["motor_g"])[:: len(stock) - 1]
     more = 1e-3 * 9.80665 * (heavy["motor_g"] - light["motor_g"])  # each lifts itself
     assert heavy["at_N"] - light["at_N"] == pytest.approx(more, rel=0.1)
-    named = bemt.choose(mass_kg=1.4, cells=4, rotors=4, labels=[heavy["label"]], motors=heavy["motor"])
+    same = {"labels": [heavy["label"]], "motors": heavy["motor"], "rest_kg": found.target.rest_kg}
+    named = bemt.choose(mass_kg=1.4, cells=4, rotors=4, **same)
     assert named.power_W.iloc[0] == pytest.approx(heavy["power_W"], rel=1e-3)
     assert named.on_sale.empty
     with pytest.raises(InputError, match="no motor has"):
