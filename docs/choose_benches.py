@@ -24,8 +24,10 @@ from numpy.typing import NDArray
 
 from bemt import choose
 from bemt.base.units import G0, INCH
-from bemt.data.readers.uiuc_names import class_of, parse_file_name
+from bemt.data.readers.uiuc_names import UiucName, class_of, parse_file_name
 from bemt.tools.design.motors_file import KnownMotor
+from bemt.tools.design.rotor_loads import rotor_loads, scatter, size_in
+from bemt.tools.design.search import POWER_BAND
 
 Array = NDArray[np.float64]
 LBF = 4.4482216
@@ -135,24 +137,46 @@ def aerocats(folder: Path) -> Bench:
     return Bench("Aerocats, shaft", rows, IDEAL, 12)
 
 
-def uiuc(folder: Path) -> Iterator[Bench]:
-    """UIUC static runs by diameter, two blades, printed families left out; equal labels of several makers together."""
-    found: dict[str, dict[str, tuple[Array, Array]]] = {name: {} for name in UIUC}
+def _static(folder: Path) -> Iterator[tuple[UiucName, Array, Array, Array]]:
+    """UIUC's propellers of two blades on sale, with speed [rev/min], CT and CP at rest."""
     for file in sorted(folder.glob("uiuc*/volume-*/*_static_*.txt")):
         parsed = parse_file_name(file.stem)
         one = None if parsed is None else parsed.propeller
-        if one is None or one.family.startswith(("da4", "nr")) or (one.blades or 2) != 2:
-            continue
+        if one is not None and one.pitch_in and not one.family.startswith(("da4", "nr")) and (one.blades or 2) == 2:
+            yield one, *np.loadtxt(file, skiprows=1, ndmin=2).T[:3]
+
+
+def _label(one: UiucName) -> str:
+    return f"{one.diameter_in:g}x{one.pitch_in:g}{SUFFIX.get(class_of(one.family) or '', '')}"
+
+
+def uiuc(folder: Path) -> Iterator[Bench]:
+    """UIUC static runs by diameter, two blades, printed families left out; equal labels of several makers together."""
+    found: dict[str, dict[str, tuple[Array, Array]]] = {name: {} for name in UIUC}
+    for one, rpm, CT, CP in _static(folder):
         for name, D in UIUC.items():
-            if one.diameter_in == D and one.pitch_in:
-                rpm, CT, CP = np.loadtxt(file, skiprows=1, ndmin=2).T[:3]
-                n = rpm / 60.0
-                label = f"{D:g}x{one.pitch_in:g}{SUFFIX.get(class_of(one.family) or '', '')}"
+            if one.diameter_in == D:
+                n, label = rpm / 60.0, _label(one)
                 T, P = 1.225 * CT * n**2 * (D * INCH) ** 4, 1.225 * CP * n**3 * (D * INCH) ** 5
                 old = found[name].get(label, (np.empty(0), np.empty(0)))
                 found[name][label] = np.r_[old[0], T], np.r_[old[1], P]
     for name, rows in found.items():
         yield Bench(f"UIUC {name}, shaft", rows, IDEAL, 12)
+
+
+def labels(folder: Path) -> Iterator[tuple[str, float, float]]:
+    """Family of each of UIUC's propellers, how far shaft power at its middle thrust is from the label's, and its u."""
+    for one, rpm, CT, CP in _static(folder):
+        i, label = rpm.size // 2, _label(one)
+        D = size_in(label) * INCH
+        found = rotor_loads(label, 1.3 * rpm[i], 0.0)
+        if found is None:
+            continue
+        n, band = rpm[i] / 60.0, scatter(label, rpm[i], 0.0)
+        T = np.interp(rpm[i], found.rpm, found.thrust_N) / (1.225 * n**2 * D**4)
+        P = 2.0 * math.pi * found.torque_at(rpm[i : i + 1])[0] / (1.225 * n**2 * D**5)
+        u2 = band.u_torque**2 + (1.5 * band.u_thrust) ** 2 - 3.0 * band.correlation * band.u_thrust * band.u_torque
+        yield one.family, math.log(P / CP[i]) - 1.5 * math.log(T / CT[i]), POWER_BAND * math.sqrt(u2)
 
 
 def benches(folder: Path) -> Iterator[Bench]:
@@ -164,8 +188,8 @@ def benches(folder: Path) -> Iterator[Bench]:
     yield from uiuc(folder)
 
 
-def compared(bench: Bench) -> Iterator[tuple[float, dict[str, tuple[float, float, float]]]]:
-    """Thrusts [N], and measured and predicted g/W of each label there, with its relative uncertainty."""
+def compared(bench: Bench) -> Iterator[tuple[float, dict[str, tuple[float, float, float, float]]]]:
+    """Thrusts [N], and g/W of each label there: measured, predicted, its relative u, and by the mean power."""
     most = min(T.max() for T, _ in bench.rows.values())
     for share in SHARES:
         thrust = float(f"{share * most:.2g}")
@@ -178,7 +202,8 @@ def compared(bench: Bench) -> Iterator[tuple[float, dict[str, tuple[float, float
         ).set_index("label")  # fmt: skip
         out = {
             label: (1e3 * thrust / G0 / power_at(thrust, *row), float(table.g_per_W[label]),
-                    float(table.u_power_W[label] / table.power_W[label]))
+                    float(table.u_power_W[label] / table.power_W[label]),
+                    1e3 * thrust / G0 / float(table.mean_W[label]))
             for label, row in inside.items()
             if math.isfinite(table.g_per_W[label])
         }  # fmt: skip
@@ -194,16 +219,16 @@ def main() -> None:
     print("| bench | propellers | thrust N | measured best | first of `choose` | loses |\n|---|---|---|---|---|---|")
     for bench in benches(folder):
         for thrust, found in compared(bench):
-            best, first = (max(found, key=lambda label: found[label][i]) for i in (0, 1))
+            best, first = (max(found, key=lambda label: found[label][i]) for i in (0, 3))
             lost = 1.0 - found[first][0] / found[best][0]
             total, right = total + 1, right + (first == best)
             losses.append(lost)
-            errors += [(bench.name, a / b - 1.0, u) for a, b, u in found.values()]
+            errors += [(bench.name, a / b - 1.0, u) for a, b, u, _ in found.values()]
             shown = [f"{label}, {found[label][0]:.3g} ({found[label][1]:.3g})" for label in (best, first)]
             row = (bench.name, f"{len(found)}", f"{thrust:g}", *shown, "-" if first == best else f"{lost:.1%}")
             print(f"| {' | '.join(row)} |", flush=True)
             if "-v" in sys.argv:
-                print("   ", {k: (round(a, 2), round(b, 2)) for k, (a, b, _) in found.items()})
+                print("   ", {k: (round(a, 2), round(b, 2)) for k, (a, b, *_) in found.items()})
     table = pd.DataFrame(errors, columns=["bench", "error", "u"])
     battery, rest = ~table.bench.str.contains("shaft"), ~table.bench.str.contains("[1-9] kt")
     groups = {"power": table, "current": table[battery], "current at rest": table[battery & rest]}
@@ -212,6 +237,15 @@ def main() -> None:
         z = (some.error / some.u).abs()
         print(f"{what}: {len(some)} readings, off by {some.error.abs().median():.1%} in the median; "
               f"{(z < 1.0).mean():.0%} within one u, {(z < 2.0).mean():.0%} within two")  # fmt: skip
+    stand = table.bench.str.partition(",")[0].str.replace(r"UIUC.*", "UIUC", regex=True)
+    known = pd.DataFrame(labels(folder), columns=["bench", "error", "u"])
+    table, known = (t.assign(z=(t.error / t.u).abs()) for t in (table.assign(bench=stand), known))
+    both = pd.concat([table, known])
+    for what, some in {"benches": table, "labels of UIUC": known, "both": both}.items():
+        rms = {one: math.sqrt((both.z[both.bench != one] ** 2).mean()) for one in some.bench.unique()}
+        held = some.z / some.bench.map(rms)
+        print(f"{what}: {len(some)}, rms {math.sqrt((some.z**2).mean()):.2f} of u; by all but the same stand or "
+              f"family {(held < 1.0).mean():.0%} within one, {(held < 2.0).mean():.0%} within two")  # fmt: skip
     print(f"{right} of {total} right; g/W lost: mean {np.mean(losses):.1%}, most {np.max(losses):.1%}")
 
 

@@ -43,8 +43,8 @@ def row(words: str, found: DriveChoice) -> str:
         most = table.loc[table.full_thrust_N.idxmax()]
         return f"| {words} | none is sure; {most.label} gives {most.full_thrust_N:.3g} N |" + " |" * 7
     even = table[(table.label == first.label) & (table.probability >= 0.5)].kv.min()
-    least = best_of_each(found.good).sort_values("power_W").iloc[0]
-    gain = 1.0 - least.power_W / first.power_W
+    least = best_of_each(found.good).sort_values("mean_W").iloc[0]
+    gain = 1.0 - least.mean_W / first.mean_W
     other = "the same" if least.label == first.label else f"{least.label}, {gain:.1%} less"
     stock = next((f"{m.motor}, {m.motor_g:.0f} g, {m.power_W:.3g} W" for m in found.on_sale.itertuples()), "-")
     cells = (words, first.label, f"{first.kv:.0f} ({even:.0f})", f"{first.power_W:.3g} ± {first.u_power_W:.2g}",

@@ -1,5 +1,7 @@
 """A QPROP file by QPROP's own equations, for where the program is not built: ``python docs/qprop_equations.py``.
 
+With ``qprop`` on the path the program itself answers. It reads `qcon.def` of its folder: density, viscosity, sound.
+
 M. Drela, "QPROP formulation" (MIT, 2006; not read): swirl by Prandtl's factor at the local wake angle, without
 light-loading assumption, as in gvcalc.f, tqcalc.f and cdfun.f of QPROP 1.22 (read). The Reynolds number to which drag
 is scaled is that of the first station for all, as there; 25 stations with splines between those of the file. The rise
@@ -9,6 +11,8 @@ of the drag above the critical Mach number is left out.
 from __future__ import annotations
 
 import math
+import shutil
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -72,6 +76,15 @@ def loads(path: Path, rpm: float, airspeed_m_s: float, air: Any) -> tuple[float,
     return float(np.sum(half * (cl * Wt - cd * Wa))), float(np.sum(half * (cl * Wa + cd * Wt) * r))
 
 
+def program(path: Path, rpm: float, airspeed_m_s: float, air: Any) -> tuple[float, float]:
+    """Thrust [N] and torque [N m] of the program `qprop`, by its format 2100 (qprop.f); NaN where it ends without."""
+    (path.parent / "qcon.def").write_text(f" {air.rho:.9g}\n {air.mu:.9g}\n {air.a_sound:.9g}\n")
+    call = ["qprop", path.name, "motor", f"{airspeed_m_s:.9g}", f"{rpm:.9g}"]
+    said = subprocess.run(call, cwd=path.parent, capture_output=True, text=True, timeout=60).stdout
+    rows = [line for line in said.splitlines() if len(line) > 150 and line[0] == "#" and line[8:9].isdigit()]
+    return (float(rows[-1][28:40]), float(rows[-1][40:52])) if rows else (math.nan, math.nan)
+
+
 def compared() -> list[tuple[str, float, float, float, float]]:
     """Case, speed, airspeed, and how far thrust and torque of QPROP's equations are off BEMT's [%]."""
     import tempfile
@@ -92,7 +105,8 @@ def compared() -> list[tuple[str, float, float, float, float]]:
             with tempfile.TemporaryDirectory() as folder:
                 path = Path(folder) / "blade.qprop"
                 path.write_text(str(next(iter(exports()["qprop"].write(job).values()))), encoding="utf-8")
-                T, Q = loads(path, rpm, V, case.air())
+                by = program if shutil.which("qprop") else loads
+                T, Q = by(path, rpm, V, case.air())
             rows.append((name, rpm, V, 100.0 * (T / own.thrust_N[0] - 1.0), 100.0 * (Q / own.torque_Nm[0] - 1.0)))
     return rows
 

@@ -1023,6 +1023,17 @@ def test_a_qprop_file_gives_its_loads_in_the_equations_of_qprop(script: Script) 
         assert abs(thrust) <= (10.0 if V == 0.0 else 7.0) and abs(torque) <= 6.0
 
 
+def test_qprop_itself_agrees_with_its_equations(script: Script, job: Job, tmp_path: Path) -> None:
+    """Where `qprop` is on the path: the program reads our file and gives what its transcribed equations give."""
+    if shutil.which("qprop") is None:
+        pytest.skip("not installed: qprop")
+    equations, path = script("qprop_equations"), tmp_path / "blade.qprop"
+    path.write_text(str(next(iter(exports()["qprop"].write(job).values()))), encoding="utf-8")
+    for rpm, V in ((4000.0, 0.0), (8000.0, 5.0), (8000.0, 12.0)):
+        found = equations.program(path, rpm, V, job.case.air())
+        assert found == pytest.approx(equations.loads(path, rpm, V, job.case.air()), rel=2e-3)
+
+
 # ---------------------------------------------------------------- from rest, at the program's own step
 
 

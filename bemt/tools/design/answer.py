@@ -145,11 +145,11 @@ class DriveChoice(Answered):
             f"Take {first.label} with {first.kv:.0f} rev/min/V{even}: {_banded(first.power_W, first.u_power_W)} W at "
             f"{at}, {first.g_per_W:.3g} g/W"
         ]
-        least = self.good.power_W.idxmin()
+        least = self.good.mean_W.idxmin()
         if least != 0:
             other = table.loc[least]
             lines.append(
-                f"The least power has {other.label} with {other.kv:.0f}: {1.0 - other.power_W / first.power_W:.1%} "
+                f"The least power has {other.label} with {other.kv:.0f}: {1.0 - other.mean_W / first.mean_W:.1%} "
                 f"less, {other.diameter_in - first.diameter_in:.3g} in larger"
                 + ("" if t.rest_kg is None else f", {other.propulsion_g - first.propulsion_g:+.0f} g a rotor")
             )

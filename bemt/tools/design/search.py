@@ -65,10 +65,10 @@ FAN_MM = (30, 40, 50, 55, 64, 70, 80, 90, 105, 120)
 """Ducted fans on sale [mm]."""
 TIP_IN_WATER = 40.0
 """Tip speed to which a propeller is solved in water: it cavitates long before [m/s]."""
-POWER_BAND = 0.7
-"""Standard uncertainty of the power at a thrust over the scatter of the draws: on 261 readings of six stands the rms of
-the error over it is 0.62, stand by stand 0.8 (0.71 to 0.86 with one left out). Thrust and torque of a label err
-together more than the draws say; with 0.7, 79 % lie within one and 96 % within two (docs/choose.md) [1]."""
+POWER_BAND = 0.64
+"""Standard uncertainty of the power at a thrust over the scatter of the draws: rms of the error over it, of 256
+readings of six stands (0.58) and 149 labels of UIUC at rest (0.73); 0.63 to 0.69 with a stand or a maker's family left
+out. The bands of thrust and torque are wider than labels err at rest (docs/choose_benches.py) [1]."""
 NEAR = 0.05
 """The smallest within this share of the least power comes first: the optimum is flat, and no label is known better."""
 DRAWS = 256
@@ -137,12 +137,13 @@ def choose(
 ) -> tuple[pd.DataFrame, Target, pd.DataFrame]:  # fmt: skip
     """Rank propellers and motors; arguments as those of :func:`bemt.choose`.
 
-    A row per pair, best first; ``propulsion_g`` is the mass of one rotor's motor, propeller, controller and arm,
-    ``at_N`` the thrust of the power, ``mass_kg`` what the vehicle weighs with the pair, ``reached`` the probability of
-    thrust and tip Mach number without the time,
-    ``why`` says why it is not the first. Pairs that meet the target with the
-    probability `sure` come first: the smallest within 5 % of the least power, the one with the least power, then by
-    power. Beside it the target as it was tried, and likewise up to three motors on sale for the first propeller.
+    A row per pair, best first. ``mean_W`` is the power to expect over its band, exp(u^2/2) times the nominal one: of
+    two equal labels that which is known better costs less. ``propulsion_g`` is the mass of one rotor's motor,
+    propeller, controller and arm, ``at_N`` the thrust of the power, ``mass_kg`` what the vehicle weighs with the pair,
+    ``reached`` the probability of thrust and tip Mach number without the time, ``why`` says why it is not the first.
+    Pairs that meet the target with the probability `sure` come first: the smallest within 5 % of the least mean power,
+    the one with the least, then by mean power. Beside it the target as it was tried, and likewise up to three motors on
+    sale for the first propeller.
     """
     import pandas as pd
 
@@ -213,10 +214,10 @@ def _on_sale(
     if not target.sized or first.probability < sure or target.use.fluid != "air":
         return []
     one = next(x for x in loads if x.label == first.label)
-    even = table.kv[(table.label == first.label) & (table.probability >= 0.5)].min()
+    even = table[(table.label == first.label) & (table.probability >= 0.5)].sort_values("kv").iloc[0]
     theirs, u = dataclasses.replace(target, sized=False), rotor_loads.nearest(one, spreads)
     found: dict[str, dict[str, Any]] = {}
-    for motor in motors_file.on_sale(math.sqrt(even * first.kv), first.motor_g, 0.8 * first.peak_A):
+    for motor in motors_file.on_sale(math.sqrt(even.kv * first.kv), first.motor_g, 0.8 * even.peak_A):
         if motor.maker in found:
             continue
         row = _rows(one, u, (motor,), theirs)[0] | {"maker": motor.maker, "max_current_A": motor.max_current_A}
@@ -463,14 +464,15 @@ def _rows(
     if target.minutes is not None:
         met &= minutes >= target.minutes
     chance = met[:, 1:].mean(axis=1)
-    scatter = [
-        POWER_BAND * float(np.std(p[np.isfinite(p)])) if np.isfinite(p).sum() > 9 else math.nan for p in power[:, 1:]
-    ]
+    scatter = np.array(
+        [POWER_BAND * float(np.std(p[np.isfinite(p)])) if np.isfinite(p).sum() > 9 else math.nan for p in power[:, 1:]]
+    )
+    mean = power[:, 0] * np.exp(np.minimum(0.5 * (scatter / power[:, 0]) ** 2, 10.0))
     at, asked, n_at = (np.broadcast_to(v, power.shape)[:, 0] for v in (at, asked, n_at))
     return [
         {"label": loads.label, "diameter_in": loads.diameter_m / INCH, "motor": m.name, "kv": m.kv,
          "probability": float(chance[i]), "reached": float(reached[i]),
-         "power_W": float(power[i, 0]), "u_power_W": scatter[i],
+         "power_W": float(power[i, 0]), "u_power_W": float(scatter[i]), "mean_W": float(mean[i]),
          "current_A": float(amps[i, 0]), "peak_A": float(peak[i]),
          "g_per_W": 1e3 * float(at[i]) / G0 / float(power[i, 0]), "minutes": float(minutes[i, 0]),
          "rpm": float(n_at[i]),
@@ -493,15 +495,15 @@ def _parts(loads: RotorLoads, target: Target, rpm: float, thrust_N: float, motor
 
 
 def _ranked(table: pd.DataFrame, sure: float) -> pd.DataFrame:
-    """Sure pairs first: the smallest within `NEAR` of the least power, the least power, then by power."""
-    lost = table.power_W.isna() | (table.probability < sure)
-    power = table.power_W.where(~lost, math.inf)
+    """Sure pairs first: the smallest within `NEAR` of the least mean power, the least, then by mean power."""
+    lost = table.mean_W.isna() | (table.probability < sure)
+    power = table.mean_W.where(~lost, math.inf)
     order = np.lexsort((-table.full_thrust_N, power, np.where(lost, -table.probability, 0.0), lost))
     found = table.iloc[order].reset_index(drop=True)
     good = found[: int((~lost).sum())]
     if good.empty:
         return found
-    near = good[good.power_W <= (1.0 + NEAR) * good.power_W.iloc[0]]
+    near = good[good.mean_W <= (1.0 + NEAR) * good.mean_W.iloc[0]]
     first = near[near.diameter_in <= near.diameter_in.min() * (1.0 + 1e-9)].index[0]
     return found.loc[[first, *found.index.drop(first)]].reset_index(drop=True)
 
@@ -526,7 +528,7 @@ def _reasons(table: pd.DataFrame, target: Target, sure: float) -> list[str]:
         if not words and row.probability < sure:
             words.append(f"{' and '.join(short)} in hand: too little for the bands")
         if not words and i:
-            more, size = row.power_W / best.power_W - 1.0, row.diameter_in - best.diameter_in
+            more, size = row.mean_W / best.mean_W - 1.0, row.diameter_in - best.diameter_in
             words.append(f"{more:+.1%} power" + (f", {size:+.3g} in" if more < 0.0 and size > 0.0 else ""))
         out.append(", ".join(words))
     return out
