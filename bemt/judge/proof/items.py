@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -331,7 +331,7 @@ def _judge(
     return *rule.separation(own), tuple(rule.alike(own, others))
 
 
-def recording_text(columns: Mapping[str, Array]) -> str:
+def recording_text(columns: Mapping[str, Iterable[float]]) -> str:
     """Recording as CSV."""
     head = ["# concealed recording", ",".join(columns)]
     body = zip(*([f"{float(v):.{_DIGITS}g}" if n != "run" else str(int(v)) for v in column]

@@ -60,22 +60,14 @@ Points = Sequence[Mapping[str, float]]
 
 
 class Hand(Protocol):
-    """What makes the runs that an answer asks for: the hidden stand of an item, or one behind a wire.
+    """What makes the runs that an answer asks for: the hidden stand of an item, or one behind a wire."""
 
-    Recordings are the texts of their files, "" where the stand cannot make them. Causes in ``mended`` are no longer
-    there; each ``day`` has noise of its own.
-    """
+    def measured(self, kind: str, runs: Sequence[Points] = (), mended: Sequence[str] = (), day: int = 0) -> str:
+        """Make a run; the text of its recording, "" where the stand cannot.
 
-    def reference(self) -> str:
-        """Make the run without the causes that can be taken away."""
-        ...
-
-    def run(self, runs: Sequence[Points], mended: Sequence[str], day: int) -> str:
-        """Make the last of the runs that were asked for."""
-        ...
-
-    def again(self, mended: Sequence[str], day: int) -> str:
-        """Make the points of the recording once more."""
+        ``again``: the points of the recording; ``reference``: these without the causes that can be taken away; ``run``:
+        the last of ``runs``. Causes in ``mended`` are no longer there; each ``day`` has noise of its own.
+        """
         ...
 
     def there(self, name: str) -> bool:
@@ -98,15 +90,13 @@ class _Hidden:
     entry: Entry
     bench: Bench
 
-    def reference(self) -> str:
-        file = self.out / prove.ASKED / self.entry.folder / _REFERENCE
-        return file.read_text("utf-8") if file.exists() else ""
-
-    def run(self, runs: Sequence[Points], mended: Sequence[str], day: int) -> str:
+    def measured(self, kind: str, runs: Sequence[Points] = (), mended: Sequence[str] = (), day: int = 0) -> str:
+        if kind == "reference":
+            file = self.out / prove.ASKED / self.entry.folder / _REFERENCE
+            return file.read_text("utf-8") if file.exists() else ""
+        if kind == "again":
+            return recorded_again(self.bench, self.entry, mended, day)
         return "" if self.bench.rows.transient else further_run(self.bench, self.entry, runs, mended, day)
-
-    def again(self, mended: Sequence[str], day: int) -> str:
-        return recorded_again(self.bench, self.entry, mended, day)
 
     def there(self, name: str) -> bool:
         return name in self.entry.causes
@@ -130,14 +120,14 @@ class _Item:
 
     def reference(self) -> int:
         """Bring the reference; how many points it has, 0 if there can be none."""
-        words = self.hand.reference()
+        words = self.hand.measured("reference")
         if words:
             write_atomic(self.box / _REFERENCE, words)
         return words.count("\n") - 1 if words else 0
 
     def run(self, points: Points) -> str:
         """Measure new points; name of the file, "" if the stand cannot."""
-        words = self.hand.run([*self.runs, points], self.mended, len(self.mended)) if points else ""
+        words = self.hand.measured("run", [*self.runs, points], self.mended, len(self.mended)) if points else ""
         if not words:
             return ""
         self.runs.append(list(points))
@@ -149,9 +139,9 @@ class _Item:
         """Take causes away, those that are there, and record everything once more; how many points that is."""
         self.mended += self.hand.mend(names)
         self.days, points = self.days + 1, 0
-        texts = {"recording.csv": self.hand.again(self.mended, self.days)}
+        texts = {"recording.csv": self.hand.measured("again", [], self.mended, self.days)}
         for k in range(1, len(self.runs) + 1):
-            texts[f"run_{k}.csv"] = self.hand.run(self.runs[:k], self.mended, self.days)
+            texts[f"run_{k}.csv"] = self.hand.measured("run", self.runs[:k], self.mended, self.days)
         for name, words in texts.items():
             if not words:
                 return 0
@@ -276,9 +266,9 @@ def _course(
         for file in (out / "items" / entry.folder).iterdir():
             write_atomic(Path(box) / file.name, file.read_text("utf-8"))
         if hand is not None:  # everything is measured by it, the first recording, too
-            write_atomic(Path(box) / "recording.csv", hand.again((), 0))
+            write_atomic(Path(box) / "recording.csv", hand.measured("again"))
             if (Path(box) / _REFERENCE).exists():
-                write_atomic(Path(box) / _REFERENCE, hand.reference())
+                write_atomic(Path(box) / _REFERENCE, hand.measured("reference"))
             first, words = prove.asked(Path(box), prove.question(Path(box)))
             if not first:
                 raise RuntimeError(f"item {entry.folder}: {words}")

@@ -1,10 +1,9 @@
 """The guard: a process of its own that owns the wire. Whatever happens to the one that gives orders, the motor stops.
 
-``python -m bemt.tools.stand.guard`` reads a line of JSON, the :class:`Limits` and the wire, then orders, a line each:
-``{"go": pulse width}``, ``{"beat": 1}``, ``{"stop": reason}``. It answers with rows, ``{"us": .., "row": {..}}``, and
-``{"stopped": reason}``. An order is approached at the ramp rate, the stop value at once. It stops for good at the end
-of its input (the other process is dead), without a beat, without a new row, at a reading that is no number, above a
-limit, and where the wire is lost; then it goes on writing the stop value.
+``python -m bemt.tools.stand.guard`` reads a line of JSON, ``[driver, address, line, limits]``, then an :class:`Order` a
+line; it answers with a :class:`Word` a line. An order is approached at the ramp rate, the stop value at once. It stops
+for good at the end of its input (the other process is dead), without an order, without a new row, at a reading that is
+no number, above a limit, and where the wire is lost; then it goes on writing the stop value.
 """
 
 from __future__ import annotations
@@ -18,6 +17,7 @@ import sys
 import threading
 import time
 from collections.abc import Mapping
+from dataclasses import field
 from typing import Any
 
 from bemt.base.document import Documented
@@ -40,7 +40,12 @@ class Limits(Documented):
     rpm: float = math.inf
     stop_us: float = 1000.0
     tick_s: float = 0.01
-    patience_s: float = 0.2  # Longest wait for the stand; no row for one and a half of it, no beat for two stops [s]
+    patience_s: float = 0.2  # Longest wait for the stand; no beat for two of it stops [s]
+
+    @property
+    def silence_s(self) -> float:
+        """Longest time without a new row. [s]"""
+        return 1.5 * self.patience_s
 
     def broken(self, row: dict[str, float]) -> str:
         """What a row says against going on; "" if nothing.
@@ -60,31 +65,21 @@ class Limits(Documented):
         return ""
 
 
-class Start(Documented):
-    """First line to the guard: the wire, and what the stand may do."""
-
-    driver: str
-    address: str
-    line: str
-    limits: Limits
-
-
 class Order(Documented):
-    """A line to the guard: a pulse width to go to [us], a sign of life, a reason to stop, the end."""
+    """A line to the guard: a pulse width to go to [us], a reason to stop, or, with neither, a sign of life."""
 
     go: float | None = None
-    beat: int | None = None
-    stop: str | None = None
-    end: int | None = None
+    stop: str = ""
 
 
 class Word(Documented):
-    """A line from the guard: its pulse width [us] with a row, why it stopped, or the faults of the wire."""
+    """A line from the guard: when [s], its pulse width [us], a new row, why it stopped, what is wrong with the wire."""
 
-    us: float | None = None
-    row: Mapping[str, float] | None = None
-    stopped: str | None = None
-    refused: tuple[Mapping[str, Any], ...] | None = None
+    at: float  # A line may wait in the pipe of a busy machine
+    us: float
+    row: Mapping[str, float] = field(default_factory=dict)
+    stopped: str = ""
+    refused: tuple[Mapping[str, Any], ...] = ()
 
 
 class Guard:
@@ -101,7 +96,7 @@ class Guard:
     def order(self, said: Order) -> None:
         """Take an order."""
         self.beat = time.monotonic()
-        if said.stop is not None:
+        if said.stop:
             self.stop(said.stop)
         if said.go is not None and not self.stopped:
             self.target = min(max(said.go, self.limits.stop_us), self.limits.largest_us)
@@ -135,7 +130,7 @@ class Guard:
         turning = max(self.us, self.target) > self.limits.stop_us
         if why := self.limits.broken(self.row):
             self.stop(why)
-        elif turning and now - self.fresh > 1.5 * self.limits.patience_s:
+        elif turning and now - self.fresh > self.limits.silence_s:
             self.stop(f"no row from the stand for {now - self.fresh:.2f} s")
         elif turning and now - self.beat > 2.0 * self.limits.patience_s:
             self.stop(f"no heartbeat for {now - self.beat:.2f} s")
@@ -144,14 +139,18 @@ class Guard:
         if self.us != before or now - self.written > _QUIET_S:
             self.write()
 
+    def told(self) -> Word:
+        """What to tell after a tick. A row is told once: again, a rotor that spins up would look steady."""
+        return Word(self.then, self.us, self.row if self.fresh == self.then else {}, self.stopped)
 
-def _orders(into: queue.SimpleQueue[Order]) -> None:
+
+def _orders(into: queue.SimpleQueue[Order | None]) -> None:
     for line in sys.stdin:
         try:
             into.put(Order.from_document(json.loads(line)))
         except (ValueError, TypeError):
             into.put(Order(stop="an order that cannot be read"))
-    into.put(Order(stop="the orders ended", end=1))
+    into.put(None)
 
 
 def _tell(said: Word) -> None:
@@ -165,36 +164,33 @@ def _tell(said: Word) -> None:
 def main() -> None:
     """Guard a wire until the orders end."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the one that gives orders
-    given = Start.from_document(json.loads(sys.stdin.readline()))
+    *where, told = json.loads(sys.stdin.readline())
+    limits = Limits.from_document(told)
     os.set_blocking(1, False)
-    drivers.PATIENCE_S = given.limits.patience_s
+    drivers.PATIENCE_S = limits.patience_s
     try:
-        wire = connect(given.driver, given.address, given.line)
+        guard = Guard(connect(*where), limits)
     except InputError as error:
-        _tell(Word(refused=tuple(vars(f) for f in error.faults)))
+        _tell(Word(time.monotonic(), limits.stop_us, refused=tuple(vars(f) for f in error.faults)))
         return
-    guard = Guard(wire, given.limits)
     signal.signal(signal.SIGTERM, lambda *_: guard.stop("terminated"))
-    orders: queue.SimpleQueue[Order] = queue.SimpleQueue()
+    orders: queue.SimpleQueue[Order | None] = queue.SimpleQueue()
     threading.Thread(target=_orders, args=(orders,), daemon=True).start()
-    told, end = "", math.inf
+    end = math.inf
     try:
         while time.monotonic() < end:
             while not orders.empty():
                 said = orders.get()
-                guard.order(said)
-                end = time.monotonic() + _LINGER_S if said.end else end
+                guard.order(said or Order(stop="the orders ended"))
+                end = end if said else time.monotonic() + _LINGER_S
             guard.tick()
-            _tell(Word(us=guard.us, row=guard.row))
-            if guard.stopped != told:
-                told = guard.stopped
-                _tell(Word(stopped=told))
-            if told == "terminated":
+            _tell(guard.told())
+            if guard.stopped == "terminated":
                 end = min(end, time.monotonic() + _LINGER_S)
-            time.sleep(guard.limits.tick_s)
+            time.sleep(limits.tick_s)
     finally:
         guard.stop("the guard failed")
-        wire.close()
+        guard.wire.close()
 
 
 if __name__ == "__main__":

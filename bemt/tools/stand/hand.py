@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import json
-import math
 import subprocess
 import sys
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol
-
-import numpy as np
+from typing import Any
 
 from bemt.base.tables import write_atomic
 from bemt.judge.proof.items import recording_text
@@ -29,86 +28,64 @@ _LOADS = ("thrust_N", "torque_Nm")
 _READ = ("airspeed_m_s", "voltage_V")  # Channels of the wire that go into a recording, beside speed and loads
 
 
-class Person(Protocol):
-    """Who stands at the stand."""
+class Wired(ABC):
+    """Hand of a stand behind a wire (:class:`bemt.judge.proof.loop.Hand`), and the person who stands there."""
 
-    def set_up(self, kind: str, runs: Sequence[Points], mended: Sequence[str], day: int) -> Rows:
-        """Prepare a run (``again``, ``run``, ``reference``); its rows, none where it cannot be."""
-        ...
+    stand: Stand
+    keep = ""  # Folder for every run
 
-    def place(self, row: Mapping[str, float]) -> Mapping[str, float]:
-        """Bring wind and wall to a row; what is known of it beside what the wire reads."""
-        ...
-
-    def look(self, name: str) -> bool:
-        """Whether a cause is there."""
-        ...
-
-    def mend(self, names: Sequence[str]) -> Sequence[str]:
-        """Put causes right; those that were there."""
-        ...
-
-
-class Wired:
-    """Hand of a stand behind a wire (:class:`bemt.judge.proof.loop.Hand`)."""
-
-    def __init__(self, stand: Stand, person: Person, may: Callable[[str, Rows], bool] | None = None, keep: str = ""):
-        self.stand, self.person, self.may, self.keep = stand, person, may, keep
+    def __init__(self) -> None:
+        self.may: Callable[[str, Rows], bool] = lambda kind, rows: True
         self.made: list[tuple[str, str]] = []  # Kind and text of every run, in order
 
-    def reference(self) -> str:
-        """Make the points of the recording without the causes that can be taken away."""
-        return self._measured("reference", self.person.set_up("reference", [], (), 0))
+    @abstractmethod
+    def set_up(self, kind: str, runs: Sequence[Points], mended: Sequence[str], day: int) -> Rows:
+        """Prepare a run; its rows, none where it cannot be."""
 
-    def run(self, runs: Sequence[Points], mended: Sequence[str], day: int) -> str:
-        """Make the last of the runs that were asked for."""
-        return self._measured("run", self.person.set_up("run", runs, mended, day))
+    @abstractmethod
+    def place(self, row: Mapping[str, float]) -> Mapping[str, float]:
+        """Bring wind and wall to a row; what is known of it beside what the wire reads."""
 
-    def again(self, mended: Sequence[str], day: int) -> str:
-        """Make the points of the recording once more."""
-        return self._measured("again", self.person.set_up("again", [], mended, day))
-
+    @abstractmethod
     def there(self, name: str) -> bool:
         """Look whether a cause is at work."""
-        return self.person.look(name)
 
+    @abstractmethod
     def mend(self, names: Sequence[str]) -> Sequence[str]:
         """Put causes right; those that were there."""
-        return self.person.mend(names)
 
-    def _measured(self, kind: str, rows: Rows) -> str:
-        """Recording of the rows of a run: means, and the scatter of a sample as their uncertainty."""
-        out: list[dict[str, float]] = []
-        able = bool(rows) and max(r["rpm"] for r in rows) <= self.stand.limits.rpm
-        if not able or (self.may is not None and not self.may(kind, rows)):
+    def measured(
+        self, kind: str, runs: Sequence[Points] = (), mended: Sequence[str] = (), day: int = 0
+    ) -> str:  # fmt: skip
+        """Make a run: means, and the scatter of a sample as their uncertainty."""
+        rows, out = self.set_up(kind, runs, mended, day), list[dict[str, float]]()
+        if not rows or max(r["rpm"] for r in rows) > self.stand.limits.rpm or not self.may(kind, rows):
             return ""
         for row in rows:
-            known = {"time_s": math.nan, **self.stand.meanwhile(partial(self.person.place, row))}
+            known = self.stand.meanwhile(partial(self.place, row))
             read = self.stand.at_speed(row["rpm"])
-            mine: dict[str, float] = {"run": row.get("run", 0), "rpm": read.mean["rpm"]}
-            mine["airspeed_m_s"] = row.get("airspeed_m_s", 0.0)
-            mine |= {n: read.mean[n] for n in (*_LOADS, *_READ) if n in read.mean}
-            mine |= {n: v for n, v in known.items() if n not in ("k", "rpm", "airspeed_m_s", "run")}
-            mine["time_s"] = read.seconds if math.isnan(known["time_s"]) else known["time_s"]
-            mine |= {f"u_{n}": read.scatter[n] for n in _LOADS if n in read.mean}
-            out.append(mine)
+            told = {"run": 0, "time_s": read.seconds, **known}
+            told |= {n: read.mean[n] for n in ("rpm", *_LOADS, *_READ) if n in read.mean}
+            told |= {f"u_{n}": read.scatter[n] for n in _LOADS if n in read.mean}
+            out.append({n: v for n, v in told.items() if n != "k"})  # the simulated stand's own count
         self.stand.stop()
         if len(out) < 2:
             return ""
-        self.made.append((kind, recording_text({n: np.array([r[n] for r in out]) for n in out[0]})))
+        text = recording_text({n: [r[n] for r in out] for n in out[0]})
+        self.made.append((kind, text))
         if self.keep:
-            write_atomic(Path(self.keep) / f"{len(self.made)}_{kind}.csv", self.made[-1][1])
-        return self.made[-1][1]
+            write_atomic(Path(self.keep) / f"{len(self.made)}_{kind}.csv", text)
+        return text
 
 
-class Simulated:
-    """Person at a simulated stand: the other end of its lines."""
+class Simulated(Wired):
+    """The other end of the lines of a simulated stand, in a process of its own."""
 
     def __init__(self, key: Path, item: str, wire: str, lapse: float) -> None:
+        super().__init__()
         command = [sys.executable, "-m", "bemt.tools.stand.simulated", str(key), item, wire, str(lapse)]
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        first = self._line()
-        self.wire, self.address = wire, str(first["address"])
+        self.wire, self.address = wire, str(self._line()["address"])
 
     def _line(self) -> dict[str, Any]:
         assert self.process.stdout is not None
@@ -134,26 +111,21 @@ class Simulated:
         self.ask("place", k=row["k"])
         return row
 
-    def look(self, name: str) -> bool:
-        """Whether a cause is there."""
+    def there(self, name: str) -> bool:
+        """Look whether a cause is at work."""
         return bool(self.ask("look", name=name))
 
     def mend(self, names: Sequence[str]) -> Sequence[str]:
-        """Put causes right."""
+        """Put causes right; those that were there."""
         return [str(n) for n in self.ask("mend", names=list(names))]
 
     def close(self) -> None:
         """End the process."""
-        assert self.process.stdin is not None and self.process.stdout is not None
-        self.process.stdin.close()
-        self.process.wait(5.0)
-        self.process.stdout.close()
+        self.process.communicate(timeout=5.0)
 
 
 def wire_of_the_simulated() -> str:
     """Tyto's client where it is installed, else UDP."""
-    import importlib.util
-
     return "flightstand" if importlib.util.find_spec("FlightStand") else "rcbenchmark"
 
 
@@ -167,9 +139,6 @@ def lapsed(limits: Limits, lapse: float) -> Limits:
 @contextlib.contextmanager
 def wired(out: Path, entry: Entry) -> Iterator[Hand]:
     """Hand on the simulated stand of an item of a proof: in another process, behind the wire of a real one."""
-    person = Simulated(out, entry.folder, wire_of_the_simulated(), _LAPSE)
-    try:
-        with Stand(person.wire, person.address, "", lapsed(_LIMITS, _LAPSE), 0.5, 10) as stand:
-            yield Wired(stand, person)
-    finally:
-        person.close()
+    hand = Simulated(out, entry.folder, wire_of_the_simulated(), _LAPSE)
+    with contextlib.closing(hand), Stand(hand.wire, hand.address, "", lapsed(_LIMITS, _LAPSE), 0.5, 10) as hand.stand:
+        yield hand

@@ -29,7 +29,7 @@ from bemt.physics import effects
 from bemt.rotors.case import load_case
 from bemt.tools.stand import sealed
 from bemt.tools.stand.guard import Limits
-from bemt.tools.stand.hand import Person, Rows, Simulated, Wired, lapsed, wire_of_the_simulated
+from bemt.tools.stand.hand import Rows, Simulated, Wired, lapsed, wire_of_the_simulated
 from bemt.tools.stand.verbs import Stand, Stopped
 
 if TYPE_CHECKING:
@@ -39,11 +39,12 @@ SCHEMA = "bemt.stand/1"
 _ARMING_S = 3.0  # At the stop value, until a controller takes commands
 _ABOVE = 1.1  # Speed at which the motor is stopped, over the top of the range [1]
 _UP, _WINDS = 10, 5  # Speeds of a plan at rest, and winds of one in a tunnel
-_USUAL = {"largest_us": 2000.0, "ramp_us_s": 500.0, "current_A": math.inf, "vibration_m_s2": math.inf}
+_AIR = ("temperature_C", "pressure_hPa")  # What is given beside limits
+_SIMULATED = {"largest_us": 2000.0, "ramp_us_s": 500.0}  # Limits of a simulated stand, where none are given
 _ASKED = {
     "largest_us": "Largest pulse width [us]", "ramp_us_s": "Fastest rise of the pulse width [us/s]",
-    "current_A": "Largest current [A]", "vibration_m_s2": "Largest vibration [m/s2]",
-    "temperature_C": "Temperature of the air [C]", "pressure_hPa": "Pressure of the air, at the stand [hPa]",
+    "current_A": "Largest current [A]", "temperature_C": "Temperature of the air [C]",
+    "pressure_hPa": "Pressure of the air, at the stand [hPa]",
 }  # fmt: skip
 
 
@@ -99,8 +100,10 @@ def ask(question: str) -> str:
     return sys.stdin.readline().strip()
 
 
-def asked_number(name: str) -> float:
-    """Number that was asked for at the terminal."""
+def asked(name: str, given: Mapping[str, float | None]) -> float:
+    """Number as given, else asked for at the terminal."""
+    if (told := given.get(name)) is not None:
+        return told
     got = ask(f"{_ASKED[name]}?")
     try:
         return float(got)
@@ -108,17 +111,17 @@ def asked_number(name: str) -> float:
         raise InputError(Fault("", name, repr(got), "a number")) from None
 
 
-class AtTheTerminal:
-    """The person at a real stand (:class:`bemt.tools.stand.hand.Person`), asked for what no wire does."""
+class AtTheTerminal(Wired):
+    """The person at a real stand is asked for what no wire does."""
 
-    def __init__(self, points: Points, air: Mapping[str, float], wind_m_s: float, most_rpm: float) -> None:
-        self.points, self.air, self.wind, self.rpm, self.now = points, air, wind_m_s, most_rpm, 0.0
-        self.calm: Callable[[], None] = lambda: None  # Stops the motor: nobody goes near one that turns
+    def __init__(self, points: Points, air: Mapping[str, float], wind_m_s: float) -> None:
+        super().__init__()
+        self.points, self.air, self.wind, self.now = points, air, wind_m_s, 0.0
 
     def set_up(self, kind: str, runs: Sequence[Points], mended: Sequence[str], day: int) -> Rows:
         """Ask for what a run needs; no rows where it cannot be."""
         rows = [dict(p) for p in (runs[-1] if kind == "run" else self.points)]
-        if any(r["airspeed_m_s"] > self.wind or r["rpm"] > self.rpm for r in rows):
+        if max(r["airspeed_m_s"] for r in rows) > self.wind or max(r["rpm"] for r in rows) > self.stand.limits.rpm:
             return []
         need = "the rotor and the stand as they were before, without what is suspected" if kind == "reference" else ""
         if "pressure_Pa" in rows[0]:
@@ -131,11 +134,11 @@ class AtTheTerminal:
         """Ask for the wind of a row."""
         if row["airspeed_m_s"] != self.now:
             self.now = row["airspeed_m_s"]
-            self.calm()
+            self.stand.stop()  # nobody goes near a motor that turns
             ask(f"Wind of {self.now:.1f} m/s, then Enter.")
         return {**self.air, **row}
 
-    def look(self, name: str) -> bool:
+    def there(self, name: str) -> bool:
         """Ask whether a cause is there."""
         check = effects.catalogue()[name].check if name in effects.catalogue() else name
         return ask(f"Look: {check}. Is it so? [y/n]").lower().startswith("y")
@@ -219,34 +222,30 @@ def sit(
         write_atomic(out / file.relative_to(rotor.case.folder), file.read_bytes())
     log = _Log(out / "log.txt", say, yes)
     log.planned(points, case)
-    made, there = list[tuple[str, str]](), None
+    hand: Wired
     with ExitStack() as held:
         limits = _limits(rotor, on, given, top_rpm, lapse)
-        person: Person
         if on == "simulated":
-            key = out / "sealed"
             own = secrets.randbits(40) if seed is None else seed
-            digest = sealed.seal_case(key, load_case(case), points, top, faults, own)
+            digest = sealed.seal_case(out / "sealed", load_case(case), points, top, faults, own)
             log.tell(f"sealed: what is wrong with the simulated stand, SHA-256 {digest}")
-            person = one = Simulated(key, "0000", wire_of_the_simulated(), lapse)
-            held.callback(one.close)
-            wire = (one.wire, one.address, "")
+            hand = other = Simulated(out / "sealed", "0000", wire_of_the_simulated(), lapse)
+            held.callback(other.close)
+            wire = (other.wire, other.address, "")
         else:
-            person, wire = AtTheTerminal(points, _air(given), wind_m_s, limits.rpm), (on, address, line)
+            air = {"temperature_C": asked("temperature_C", given), "pressure_Pa": 100.0 * asked("pressure_hPa", given)}
+            hand, wire = AtTheTerminal(points, air, wind_m_s), (on, address, line)
+        hand.may, hand.keep = log.may, out.as_posix()
         try:
-            stand = held.enter_context(Stand(*wire, limits, settle_s=max(2.0 / lapse, 0.3)))
-            if isinstance(person, AtTheTerminal):
-                person.calm = stand.stop
-                stand.rest(_ARMING_S)
-            hand = Wired(stand, person, log.may, out.as_posix())
-            made = hand.made
-            if text := hand.again((), 0):
+            hand.stand = held.enter_context(Stand(*wire, limits, settle_s=max(2.0 / lapse, 0.3)))
+            if on != "simulated":
+                hand.stand.rest(_ARMING_S)
+            if text := hand.measured("again"):
                 write_atomic(out / "recording.csv", text)
                 _diagnosed(out, [*prove.question(out), "--top-rpm", f"{top:g}"], hand, runs, log)
         except Stopped as error:
             log.stop(str(error))
-    if on == "simulated":
-        there = sealed.bench_of(out / "sealed", "0000")[1].causes
+    there = sealed.bench_of(out / "sealed", "0000")[1].causes if on == "simulated" else None
     answer = StandAnswer(rotor.name, log.course, log.stopped, there)
     spent = sum(log.course.minutes) + minutes("run", len(points))
     end = log.stopped or log.course.end or "no run"
@@ -254,7 +253,7 @@ def sit(
     if there is not None:
         log.tell(f"unsealed: there was {', '.join(there) or 'nothing wrong'}")
     write_atomic(out / "stand.json", json_text(answer.to_dict()))
-    files = write_story(out, rotor, answer.course, made, log.lines)
+    files = write_story(out, rotor, answer.course, hand.made, log.lines)
     return replace(answer, files=(out / "stand.json", out / "log.txt", *files), lines=tuple(log.lines))
 
 
@@ -265,13 +264,6 @@ def _diagnosed(out: Path, question: list[str], hand: Wired, runs: int, log: _Log
         raise InputError(Fault(str(out / "recording.csv"), "", said[-300:], "a recording to diagnose"))
     log.told(Course("", [first]))
     log.course = follow(out, first, hand, runs, enough=A_RUN, tell=log.told, words=question)
-
-
-def _air(given: Mapping[str, float | None]) -> dict[str, float]:
-    """Air as given, else asked for."""
-    C, hPa = (asked_number(n) if given[n] is None else float(given[n] or 0.0)
-              for n in ("temperature_C", "pressure_hPa"))  # fmt: skip
-    return {"temperature_C": C, "pressure_Pa": 100.0 * hPa}
 
 
 def _found(answer: StandAnswer) -> str:
@@ -289,14 +281,14 @@ def _limits(
 ) -> Limits:  # fmt: skip
     """Limits as given, from the case, or asked for."""
     drive = rotor.case.file.drive
-    stated = {n: v for n, v in given.items() if v is not None and n in _USUAL}
+    found = {n: v for n, v in given.items() if v is not None and n not in _AIR}
     if drive is not None and drive.esc is not None:
         limit = {} if drive.esc.current_limit_A is None else {"current_A": drive.esc.current_limit_A}
-        stated = {"largest_us": drive.esc.pulse_max_us, **limit, **stated}
-    for name in ("largest_us", "ramp_us_s", "current_A") if on != "simulated" else ():
-        if name not in stated:
-            stated[name] = asked_number(name)
-    found = {**_USUAL, **stated}
+        found = {"largest_us": drive.esc.pulse_max_us, **limit, **found}
+    if on == "simulated":
+        found = {**_SIMULATED, **found}
+    else:
+        found |= {name: asked(name, found) for name in ("largest_us", "ramp_us_s", "current_A")}
     limits = Limits(**found, rpm=_ABOVE * (top_rpm or rotor.case.rpm))
     if not limits.stop_us < limits.largest_us <= 2500.0 or limits.ramp_us_s <= 0.0:
         got = f"{limits.largest_us:g} us, {limits.ramp_us_s:g} us/s"
@@ -305,7 +297,7 @@ def _limits(
 
 
 # The story of a sitting: what was run, what was said after each run, and what was decided; HTML and a picture.
-_MOST = 5  # Explanations in a picture
+_MOST_RUNS, _MOST = 4, 5  # Runs and explanations in a picture
 _KINDS = {"again": "recording", "run": "run", "reference": "reference"}
 
 
@@ -315,47 +307,41 @@ def write_story(
     """Write story.html and story.png."""
     if not made:
         return ()
-    picture = out / "story.png"
-    write_atomic(picture, png(drawn(rotor, course, made)))
-    told = [tuple(line.partition(": ")[::2]) for line in lines]
-    image = base64.b64encode(picture.read_bytes()).decode()
-    page = render("bemt.tools.stand", "story.html", title=f"{rotor.name} on the stand", lines=told, image=image)
-    write_atomic(out / "story.html", page)
-    return out / "story.html", picture
-
-
-def drawn(rotor: Propeller, course: Course, made: Sequence[tuple[str, str]]) -> Any:
-    """Loads over those of the model, run by run, beside the probabilities after each answer."""
     import matplotlib
 
-    made = made[:4]
     with matplotlib.rc_context(STYLE):
-        return _drawn(rotor, course, made)
+        picture = png(_drawn(rotor, course, made[:_MOST_RUNS]))
+    told = [tuple(line.partition(": ")[::2]) for line in lines]
+    image = base64.b64encode(picture).decode()
+    page = render("bemt.tools.stand", "story.html", title=f"{rotor.name} on the stand", lines=told, image=image)
+    write_atomic(out / "story.png", picture)
+    write_atomic(out / "story.html", page)
+    return out / "story.html", out / "story.png"
 
 
 def _drawn(rotor: Propeller, course: Course, made: Sequence[tuple[str, str]]) -> Any:
-    figure, axes = blank(3.0, 1, 3)
+    """Loads over those of the model, run by run, beside the probabilities after each answer."""
+    figure, ((*loads, ax),) = blank(3.0, 1, 3)
     for k, (kind, text) in enumerate(made):
         rows = np.genfromtxt(text.splitlines(), delimiter=",", names=True)
         points = rotor.solve(rpm=rows["rpm"], airspeed_m_s=rows["airspeed_m_s"], bands=False)
-        for ax, name in zip(axes[0], ("thrust_N", "torque_Nm"), strict=False):
-            share = 100.0 * (rows[name] / np.asarray(getattr(points, name)) - 1.0)
-            u = 100.0 * rows[f"u_{name}"] / np.asarray(getattr(points, name))
-            ax.errorbar(rows["rpm"], share, u, fmt="o", ms=3, lw=0.8, color=CYCLE[k], label=f"{k + 1} {_KINDS[kind]}")
-    for ax, what in zip(axes[0], ("thrust", "torque"), strict=False):
-        ax.axhline(0.0, color=GREY, lw=0.8)
-        ax.set(xlabel="speed [rev/min]", title=f"{what} off the model [%]")
-        frame(ax)
-    axes[0, 0].legend()
-    ax = axes[0, 2]
+        for one, name in zip(loads, ("thrust_N", "torque_Nm"), strict=True):
+            share, u = (100.0 * rows[n] / np.asarray(getattr(points, name)) for n in (name, f"u_{name}"))
+            label = f"{k + 1} {_KINDS[kind]}"
+            one.errorbar(rows["rpm"], share - 100.0, u, fmt="o", ms=3, lw=0.8, color=CYCLE[k], label=label)
+    for one, what in zip(loads, ("thrust", "torque"), strict=True):
+        one.axhline(0.0, color=GREY, lw=0.8)
+        one.set(xlabel="speed [rev/min]", title=f"{what} off the model [%]")
     said = [{r.effect or "nothing": r.probability for r in a.ranking} for a in course.answers]
     names = list(dict.fromkeys(n for one in said for n in sorted(one, key=lambda n: -one[n])[:3]))[:_MOST]
-    for k, one in enumerate(said):
+    for k, answer in enumerate(said):
         at = np.arange(len(names)) + 0.8 * (k + 0.5) / len(said) - 0.4
-        share = [one.get(n, 0.0) for n in names]
+        share = [answer.get(n, 0.0) for n in names]
         ax.barh(at, share, 0.7 / len(said), color=CYCLE[k % len(CYCLE)], label=f"answer {k + 1}")
     ax.set(yticks=np.arange(len(names)), yticklabels=names, xlim=(0.0, 1.0), title="probability")
     ax.invert_yaxis()
+    for one in (*loads, ax):
+        frame(one)
+    loads[0].legend()
     ax.legend()
-    frame(ax)
     return figure

@@ -14,7 +14,7 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent import futures
 from pathlib import Path
 from typing import Any
@@ -94,50 +94,55 @@ def _rcbenchmark(truth: Truth) -> str:
              "current_A": ("current", "A", 1.0), "rpm": ("motorOpticalSpeed", "RPM", 1.0),
              "vibration_m_s2": ("vibration", "m/s²", 1.0), "airspeed_m_s": ("airspeed", "m/s", 1.0)}  # fmt: skip
 
-    def listen() -> None:
-        while True:
-            truth.cut = False
-            truth.command(float(here.recv(1000)))
+    def tell(sample: Mapping[str, float]) -> None:
+        row = ((names[n], v) for n, v in sample.items())
+        told = {theirs: {"workingValue": v * f, "workingUnit": unit} for (theirs, unit, f), v in row}
+        here.sendto(json.dumps(told).replace("NaN", "null").encode(), other)
 
-    def send() -> None:
-        here.sendto(b"Hi from RCbenchmark script!", other)
-        while True:
-            if truth.broken != "silent":
-                row = ((names[n], v) for n, v in truth.sample().items())
-                told = {theirs: {"workingValue": v * f, "workingUnit": unit} for (theirs, unit, f), v in row}
-                here.sendto(json.dumps(told).replace("NaN", "null").encode(), other)
-            time.sleep(_SEND_S)
-
-    for one in (listen, send):
-        threading.Thread(target=one, daemon=True).start()
+    here.sendto(b"Hi from RCbenchmark script!", other)
+    _talk(truth, lambda: here.recv(1000).decode(), tell)
     return f"127.0.0.1:{here.getsockname()[1]}:{other[1]}"
 
 
 def _serial(truth: Truth) -> str:
     """Be a board at the end of a line: ``S1200`` sets, a row goes out as the default format says."""
-    ours, theirs = os.openpty()
     import tty
 
+    ours, theirs = os.openpty()
     tty.setraw(theirs)
+    lines = os.fdopen(os.dup(ours), "r", errors="replace")
+
+    def tell(r: Mapping[str, float]) -> None:
+        row = (1e3 * time.monotonic(), r["thrust_N"] / UNITS["gf"].factor, 1e3 * r["torque_Nm"], r["rpm"])
+        os.write(ours, (",".join(f"{v:.7g}" for v in (*row, r["current_A"])) + "\n").encode())
+
+    _talk(truth, lambda: lines.readline().removeprefix("S"), tell)
+    return f"{os.ttyname(theirs)}@115200"
+
+
+def _talk(truth: Truth, hear: Callable[[], str], tell: Callable[[Mapping[str, float]], None]) -> None:
+    """Take commands, and send rows."""
 
     def listen() -> None:
-        with os.fdopen(os.dup(ours), "r", errors="replace") as lines:
-            for line in lines:
-                if line.startswith("S"):
-                    truth.cut = False
-                    truth.command(float(line[1:]))
+        text = hear()
+        truth.cut = False
+        truth.command(float(text))
 
     def send() -> None:
-        while True:
-            r = truth.sample()
-            row = (1e3 * time.monotonic(), r["thrust_N"] / UNITS["gf"].factor, 1e3 * r["torque_Nm"], r["rpm"])
-            if truth.broken != "silent":
-                os.write(ours, (",".join(f"{v:.7g}" for v in (*row, r["current_A"])) + "\n").encode())
-            time.sleep(_SEND_S)
+        if truth.broken != "silent":
+            tell(truth.sample())
+        time.sleep(_SEND_S)
 
-    for one in (listen, send):
-        threading.Thread(target=one, daemon=True).start()
-    return f"{os.ttyname(theirs)}@115200"
+    _forever(listen)
+    _forever(send)
+
+
+def _forever(do: Callable[[], None]) -> None:
+    def again() -> None:
+        while True:
+            do()
+
+    threading.Thread(target=again, daemon=True).start()
 
 
 _WIRES = {"flightstand": _flightstand, "rcbenchmark": _rcbenchmark, "serial": _serial}
@@ -172,11 +177,10 @@ def main() -> None:
     _say(address=_WIRES[wire](truth))
 
     def watch() -> None:
-        while True:
-            truth.watch()
-            time.sleep(_WATCH_S)
+        truth.watch()
+        time.sleep(_WATCH_S)
 
-    threading.Thread(target=watch, daemon=True).start()
+    _forever(watch)
     for line in sys.stdin:
         _say(done=_by_hand(truth, **json.loads(line)))
     os._exit(0)  # threads of servers

@@ -17,12 +17,14 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, TypeVar
 
+import numpy as np
+
 from bemt.base.errors import Fault, InputError
 from bemt.tools.stand.drivers import connect
 from bemt.tools.stand.guard import Limits, Word
 
 T = TypeVar("T")
-_POLL_S, _START_S = 0.02, 10.0
+_POLL_S = 0.02
 # The speed is steady when it has moved by less than this share for that share of the longest wait; that near to what
 # was asked for is near enough; attempts
 _STEADY, _WINDOW, _NEAR, _TRIES = 0.005, 0.15, 0.01, 5
@@ -38,12 +40,11 @@ class SettledRow:
 
     mean: Mapping[str, float]
     scatter: Mapping[str, float]  # Standard deviation of one sample [units of the channels]
-    pulse_us: float
     samples: int
     seconds: float  # On the clock of this machine, since the stand was opened [s]
 
 
-class Stand:
+class Stand(contextlib.AbstractContextManager["Stand"]):
     """A stand behind its guard; use it in a ``with`` statement.
 
     Parameters
@@ -66,36 +67,29 @@ class Stand:
         self.known: dict[float, float] = {}  # Speed by pulse width, as it was read
         self._rows: deque[tuple[float, float, Mapping[str, float]]] = deque(maxlen=2000)
         self._refused: list[Mapping[str, Any]] = []
-        self._new = threading.Condition()
         command = [sys.executable, "-m", "bemt.tools.stand.guard"]
         self.guard = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
                                       start_new_session=True, stderr=subprocess.DEVNULL)  # fmt: skip
-        self._say(driver=driver, address=address, line=line, limits=_plain(limits))
+        self._say([driver, address, line, limits.document()])
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()
         atexit.register(self.close)
-        until = time.monotonic() + _START_S
-        while not self._rows:
-            if self._refused:
+        while not self._rows:  # the guard tells of the wire, or it ends
+            if self._refused or self.stopped:
+                why = Stopped(self.stopped)
                 self.close()
-                raise InputError([Fault(**f) for f in self._refused])
-            if self.stopped or time.monotonic() > until:
-                self.close()
-                raise Stopped(self.stopped or "the guard did not start")
+                raise InputError([Fault(**f) for f in self._refused]) if self._refused else why
             time.sleep(_POLL_S)
-
-    def __enter__(self) -> Stand:
-        return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self.close()
 
-    def _say(self, **order: Any) -> None:
+    def _say(self, said: Any) -> None:
         pipe = self.guard.stdin
         if pipe is None or pipe.closed:
             return
         try:
-            pipe.write(json.dumps(order) + "\n")
+            pipe.write(json.dumps(said) + "\n")
             pipe.flush()
         except (BrokenPipeError, OSError):
             self.stopped = self.stopped or "the guard is gone"
@@ -106,13 +100,10 @@ class Stand:
             if not text.startswith("{"):  # words of a client
                 continue
             said = Word.from_document(json.loads(text))
-            with self._new:
-                if said.us is not None and said.row is not None:
-                    self.us = said.us
-                    self._rows.append((time.monotonic(), said.us, said.row))
-                self._refused += said.refused or ()
-                self.stopped = said.stopped or self.stopped
-                self._new.notify_all()
+            self.us, self.stopped = said.us, said.stopped or self.stopped
+            self._refused += said.refused
+            if said.row:
+                self._rows.append((said.at, said.us, said.row))
         self.stopped = self.stopped or "the guard is gone"
         if self.guard.stdin is not None and not self.guard.stdin.closed and not self._refused:
             self._panic()  # killed: nobody else can reach the stand
@@ -127,7 +118,7 @@ class Stand:
         """Wait with a beat; raises as soon as the guard has stopped."""
         until = time.monotonic() + seconds
         while True:
-            self._say(beat=1)
+            self._say({})
             if self.stopped:
                 raise Stopped(self.stopped)
             left = until - time.monotonic()
@@ -149,7 +140,7 @@ class Stand:
         if not limits.stop_us <= pulse_us <= limits.largest_us:
             expected = f"{limits.stop_us:g} to {limits.largest_us:g} us, the largest that was allowed"
             raise InputError(Fault("", "pulse width", f"{pulse_us:g}", expected))
-        self._say(go=pulse_us)
+        self._say({"go": pulse_us})
         until = time.monotonic() + abs(pulse_us - self.us) / limits.ramp_us_s + self.settle_s
         step = min(10.0 * limits.tick_s, 0.1)
         while time.monotonic() < until:
@@ -162,32 +153,26 @@ class Stand:
 
     def row(self) -> SettledRow:
         """Read a row: the mean of the next samples."""
-        rows: dict[float, Mapping[str, float]] = {}
         since = time.monotonic()
-        while len(rows) < self.samples:
-            if time.monotonic() - since > self.settle_s + _START_S:
+        while len(taken := [row for at, _, row in list(self._rows) if at > since][: self.samples]) < self.samples:
+            if time.monotonic() - since > self.settle_s + self.samples * self.limits.silence_s:
                 raise Stopped("the stand sends no rows")
             self.rest(min(self.limits.tick_s, _POLL_S))
-            rows = {row["stamp_s"]: row for at, _, row in list(self._rows) if at > since}
-        taken = list(rows.values())[: self.samples]
         names = [n for n in taken[0] if n != "stamp_s"]
-        columns = {n: [row.get(n, math.nan) for row in taken] for n in names}
-        mean = {n: sum(v) / len(v) for n, v in columns.items()}
-        spread = {n: math.sqrt(sum((x - mean[n]) ** 2 for x in v) / max(len(v) - 1, 1)) for n, v in columns.items()}
-        return SettledRow(mean, spread, self.us, len(taken), time.monotonic() - self.began)
+        read = np.array([[row.get(n, np.nan) for n in names] for row in taken])
+        mean, spread = (dict(zip(names, v.tolist(), strict=True)) for v in (read.mean(0), read.std(0, ddof=1)))
+        return SettledRow(mean, spread, len(taken), time.monotonic() - self.began)
 
     def at_speed(self, rpm: float) -> SettledRow:
         """Find the pulse width of a speed from what was read so far, and read a row there. [rev/min]"""
         low, high = self.limits.stop_us, self.limits.largest_us
         row = None
         for _ in range(_TRIES):
-            known = sorted({low: 0.0, **self.known}.items())
-            below = max((k for k in known if k[1] <= rpm), key=lambda k: k[1])
-            above = min((k for k in known if k[1] > rpm), key=lambda k: k[1], default=None)
-            if above is not None:
-                us = below[0] + (above[0] - below[0]) * (rpm - below[1]) / (above[1] - below[1])
-            elif below[1] > 0.0:
-                us = low + (below[0] - low) * min(rpm / below[1], 1.5)
+            speeds, widths = zip(*sorted((n, us) for us, n in {low: 0.0, **self.known}.items()), strict=True)
+            if rpm < speeds[-1]:
+                us = np.interp(rpm, speeds, widths)
+            elif speeds[-1] > 0.0:
+                us = low + (widths[-1] - low) * min(rpm / speeds[-1], 1.5)
             else:
                 us = low + 0.15 * (high - low)
             us = float(round(min(us, high)))  # steps of common ESCs
@@ -201,7 +186,7 @@ class Stand:
 
     def stop(self) -> None:
         """Stop the motor; the stand stays open."""
-        self._say(go=self.limits.stop_us)
+        self._say({"go": self.limits.stop_us})
         while self.us > self.limits.stop_us and not self.stopped:
             self.rest(_POLL_S)
 
@@ -216,7 +201,3 @@ class Stand:
         self._listener.join(5.0)
         if self.guard.stdout is not None and not self._listener.is_alive():
             self.guard.stdout.close()
-
-
-def _plain(limits: Limits) -> dict[str, Any]:
-    return {k: v for k, v in limits.document().items() if math.isfinite(v)}

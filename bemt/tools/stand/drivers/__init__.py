@@ -8,16 +8,24 @@ from __future__ import annotations
 
 import importlib
 import re
+import time
+from functools import cache
 from typing import Protocol
 
 from bemt.base.errors import Fault, InputError
+from bemt.base.units import RPM
 
-NAMES = ("flightstand", "rcbenchmark", "serial")
-"""Drivers, one file each."""
 DEFAULTS = {"flightstand": "localhost:50051", "rcbenchmark": "127.0.0.1:55047:64126", "serial": "/dev/ttyUSB0@115200"}
 """Addresses where the makers' programs and most boards are."""
+CHANNELS = {
+    "thrust": ("thrust_N", "force"), "torque": ("torque_Nm", "torque"), "rpm": ("rpm", "angular_speed"),
+    "current": ("current_A", "current"), "voltage": ("voltage_V", "voltage"), "time": ("stamp_s", "time"),
+    "vibration": ("vibration_m_s2", "acceleration"), "airspeed": ("airspeed_m_s", "speed"),
+}  # fmt: skip
+"""What a wire may tell: our channel, and the dimension of its unit."""
 PATIENCE_S = 0.2
 """Longest wait for the other end; the guard sets it."""
+_STOP_US, _FIRST_S = 1000.0, 3.0  # What is written until the first row has come, and how long that may take
 
 
 class Wire(Protocol):
@@ -37,12 +45,12 @@ class Wire(Protocol):
 
 
 def connect(driver: str, address: str = "", line: str = "") -> Wire:
-    """Open a wire.
+    """Open a wire, and wait for the first row.
 
     Parameters
     ----------
     driver : str
-        One of :data:`NAMES`.
+        One of :data:`DEFAULTS`.
     address : str
         Where the stand is; :data:`DEFAULTS` where it is empty.
     line : str
@@ -53,10 +61,34 @@ def connect(driver: str, address: str = "", line: str = "") -> Wire:
     InputError
         For an address where nothing answers, and for a library that is missing.
     """
-    wire: Wire = importlib.import_module(f"bemt.tools.stand.drivers.{driver}").connect(
-        address or DEFAULTS[driver], line
-    )
-    return wire
+    address = address or DEFAULTS[driver]
+    driven = importlib.import_module(f"bemt.tools.stand.drivers.{driver}")
+    wire: Wire = driven.connect(address, line)
+    until = time.monotonic() + _FIRST_S
+    try:
+        while not wire.read() and time.monotonic() < until:
+            wire.write(_STOP_US)
+            time.sleep(0.02)
+        if wire.read():
+            return wire
+    except OSError:
+        pass
+    wire.close()
+    raise silent(address, f"rows like {line}" if line else driven.ROWS)
+
+
+@cache
+def factor(name: str, unit: str) -> float:
+    """Factor of a unit, as people write it, to that of the channel; NaN where it is none.
+
+    >>> factor("thrust", "gf"), factor("rpm", "RPM"), factor("thrust", "V")
+    (0.00980665, 1.0, nan)
+    """
+    from bemt.data.readers.unit_text import unit_for  # not of every guard: it starts sooner
+
+    dimension = CHANNELS[name][1]
+    known = unit_for(dimension, unit) or unit_for(dimension, unit.replace("_", "/"))
+    return known[0].factor / (RPM if name == "rpm" else 1.0) if known else float("nan")
 
 
 def parts(address: str, pattern: str, expected: str) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ from bemt.base.errors import needs
 from bemt.tools.stand import drivers
 from bemt.tools.stand.drivers import parts, silent
 
+ROWS = "samples of the Flight Stand program"
 # Their type of an input, our channel, factor to ours. The airspeed is taken to be in m/s (SI, as they say of all).
 _INPUTS = (
     ("FORCE_FZ", "thrust_N", 1.0), ("TORQUE_MZ", "torque_Nm", 1.0),

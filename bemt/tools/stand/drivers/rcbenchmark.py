@@ -9,18 +9,13 @@ import json
 import math
 import socket
 import time
+from collections.abc import Mapping
 
 from bemt.base.errors import Fault, InputError
-from bemt.base.units import UNITS
-from bemt.tools.stand.drivers import parts, silent
+from bemt.tools.stand.drivers import CHANNELS, factor, parts
 
-_CHANNELS = {
-    "thrust": "thrust_N", "torque": "torque_Nm", "motorOpticalSpeed": "rpm", "current": "current_A",
-    "voltage": "voltage_V", "vibration": "vibration_m_s2", "airspeed": "airspeed_m_s",
-}  # fmt: skip
-_THEIRS = {"N·m": "Nm", "N.m": "Nm", "g": "gf", "kg": "kgf", "m/s": "m_s"}
-_OTHER = {("vibration_m_s2", "g"): 9.80665, ("vibration_m_s2", "m/s²"): 1.0, ("rpm", "RPM"): 1.0}
-_FIRST_S = 2.0
+ROWS = "rows from rcbenchmark.js"
+_THEIRS = {"rpm": "motorOpticalSpeed"}  # Names that are not ours
 
 
 class _Script:
@@ -52,28 +47,19 @@ class _Script:
         self.socket.close()
 
 
-def _row(told: dict[str, dict[str, object]]) -> dict[str, float]:
+def _row(told: Mapping[str, Mapping[str, object]]) -> dict[str, float]:
     """Channels of a result in SI; NaN where the unit is not known."""
     row = {}
-    for theirs, ours in _CHANNELS.items():
-        cell = told.get(theirs)
-        if not isinstance(cell, dict):
-            continue
-        value, unit = cell.get("workingValue"), str(cell.get("workingUnit", ""))
-        known = UNITS.get(_THEIRS.get(unit, unit))
-        factor = _OTHER.get((ours, unit), known.factor if known else math.nan)
-        row[ours] = float(value) * factor if isinstance(value, int | float) else math.nan
+    for name, (ours, _) in CHANNELS.items():
+        cell = told.get(_THEIRS.get(name, name))
+        if isinstance(cell, Mapping):
+            value = cell.get("workingValue")
+            known = factor(name, str(cell.get("workingUnit", "")))
+            row[ours] = float(value) * known if isinstance(value, int | float) else math.nan
     return row
 
 
 def connect(address: str, line: str) -> _Script:
-    """Open host:port-of-the-script:own-port, and wait for the first result."""
+    """Open host:port-of-the-script:own-port."""
     host, there, here = parts(address, r"(\S+):(\d+):(\d+)", "host:port:own port, such as 127.0.0.1:55047:64126")
-    wire, until = _Script(host, int(there), int(here)), time.monotonic() + _FIRST_S
-    while not wire.read():
-        if time.monotonic() > until:
-            wire.close()
-            raise silent(address, "rows from rcbenchmark.js")
-        wire.write(1000.0)
-        time.sleep(0.02)
-    return wire
+    return _Script(host, int(there), int(here))

@@ -6,17 +6,17 @@ row. A name is a channel and its unit. The board must stop the motor by itself w
 
 from __future__ import annotations
 
+import math
 import re
 import time
+from typing import Any
 
 from bemt.base.errors import Fault, InputError, needs, refuse
-from bemt.base.units import UNITS
-from bemt.tools.stand.drivers import parts, silent
+from bemt.tools.stand.drivers import CHANNELS, factor, parts
 
 LINE = "S{pulse_us} -> {time_ms},{thrust_gf},{torque_mNm},{rpm},{current_A}"
-_SI = {"thrust": "N", "torque": "Nm", "rpm": "", "current": "A", "voltage": "V", "vibration": "m_s2", "airspeed": "m_s",
-       "time": "s"}  # fmt: skip
-_FIRST_S, _LONGEST = 3.0, 4096
+ROWS = f"rows like {LINE}"
+_LONGEST = 4096
 
 
 def read_format(line: str) -> tuple[str, re.Pattern[str], list[tuple[str, float]]]:
@@ -34,14 +34,12 @@ def read_format(line: str) -> tuple[str, re.Pattern[str], list[tuple[str, float]
     channels = []
     for name in names:
         what, _, unit = name.partition("_")
-        own = _SI.get(what)
-        known, wanted = UNITS.get(unit), UNITS.get(own or "")
-        fits = unit == own or (known is not None and wanted is not None and known.dimension == wanted.dimension)
-        if own is None or not fits:
-            faults.append(Fault("", "line", f"{{{name}}}", f"a channel and its unit: {', '.join(_SI)}", "As thrust_gf"))
-            continue
-        ours = "stamp_s" if what == "time" else "_".join(filter(None, (what, _SI[what])))
-        channels.append((ours, 1.0 if known is None or unit == own else known.factor))
+        known = factor(what, unit or what) if what in CHANNELS else math.nan
+        if math.isnan(known):
+            expected = f"a channel and its unit: {', '.join(CHANNELS)}"
+            faults.append(Fault("", "line", f"{{{name}}}", expected, "As thrust_gf"))
+        else:
+            channels.append((CHANNELS[what][0], known))
     missing = [c for c in ("thrust_N", "rpm") if c not in dict(channels)]
     if missing and not faults:
         faults.append(Fault("", "line", f"no {', no '.join(missing)}", "speed and thrust among the channels"))
@@ -51,16 +49,16 @@ def read_format(line: str) -> tuple[str, re.Pattern[str], list[tuple[str, float]
 
 
 class _Line:
-    def __init__(self, port: object, line: str) -> None:
+    def __init__(self, port: Any, line: str) -> None:
         self.port, self.text, self.row = port, "", dict[str, float]()
         self.command, self.pattern, self.channels = read_format(line)
 
     def write(self, pulse_us: float) -> None:
-        self.port.write(self.command.format(pulse_us=round(pulse_us)).encode() + b"\n")  # type: ignore[attr-defined]
+        self.port.write(self.command.format(pulse_us=round(pulse_us)).encode() + b"\n")
 
     def read(self) -> dict[str, float]:
-        waiting = self.port.in_waiting  # type: ignore[attr-defined]
-        self.text += self.port.read(waiting).decode("ascii", "replace") if waiting else ""  # type: ignore[attr-defined]
+        waiting = self.port.in_waiting
+        self.text += self.port.read(waiting).decode("ascii", "replace") if waiting else ""
         *lines, self.text = self.text[-_LONGEST:].split("\n")
         for found in filter(None, (self.pattern.fullmatch(one.strip()) for one in lines)):
             row = {name: float(v) * f for (name, f), v in zip(self.channels, found.groups(), strict=True)}
@@ -68,23 +66,15 @@ class _Line:
         return self.row
 
     def close(self) -> None:
-        self.port.close()  # type: ignore[attr-defined]
+        self.port.close()
 
 
 def connect(address: str, line: str) -> _Line:
-    """Open device@baud, and wait for the first row."""
+    """Open device@baud."""
     device, baud = parts(address, r"(\S+)@(\d+)", "device@baud, such as /dev/ttyUSB0@115200")
     read_format(line or LINE)
     serial = needs("serial", "stand")
     try:
-        wire = _Line(serial.serial_for_url(device, int(baud), timeout=0.0, write_timeout=0.2), line or LINE)
+        return _Line(serial.serial_for_url(device, int(baud), timeout=0.0, write_timeout=0.2), line or LINE)
     except serial.SerialException as error:
         raise InputError(Fault("", "address", f"{address}: {error}", "a serial device that can be opened")) from error
-    until = time.monotonic() + _FIRST_S
-    while not wire.read():
-        if time.monotonic() > until:
-            wire.close()
-            raise silent(address, f"rows like {line or LINE}")
-        wire.write(1000.0)
-        time.sleep(0.02)
-    return wire
