@@ -69,9 +69,10 @@ def save(folder: Path, tree: Path, only: list[str]) -> None:
         if only and name not in only:
             continue
         module = [] if words[0].endswith(".py") else ["-m", "bemt"]
+        one = {**os.environ, "PYTHONPATH": "", "OPENBLAS_NUM_THREADS": "1"}  # several threads differ in the last digits
         with tempfile.TemporaryDirectory() as made:
             line = [sys.executable, *module, *(w.format(data=data, out=f"{made}/out") for w in words)]
-            done = subprocess.run(line, cwd=tree, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": ""})
+            done = subprocess.run(line, cwd=tree, capture_output=True, text=True, env=one)
             text = (done.stdout or json.dumps({"error": done.stderr[-2000:]})).replace(made, "made")
             if "{out}" in words:
                 text = json.dumps({"answer": json.loads(text), "made": in_files(Path(made))})

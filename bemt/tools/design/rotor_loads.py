@@ -84,7 +84,7 @@ def case_of_label(label: str, fluid: str = "air", coaxial: bool = False) -> Case
     case = case_of(text, ends=False)
     changes: dict[str, Any] = {}
     if fluid == "water":
-        kept = [a for a in case.written.get("assumptions", []) if not a["key"].startswith("air.")]
+        kept = case.declared(lambda key: not key.startswith("air."))
         changes = {"air": {"fluid": "water"}, "assumptions": kept, "operating.rpm": 1000.0}
     if coaxial:
         changes |= {"second_rotor": {"z_over_D": PAIR_SPACING}}
