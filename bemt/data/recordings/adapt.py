@@ -282,8 +282,8 @@ def averaged(record: Dataset, period: float, revolutions: int | None = None) -> 
     >>> round(mean.value, 9), mean.over
     (2.0, 'last 2 revolutions (2 to 4 s, 200 rows)')
     """
-    told, every = clocks_of(record)
-    name = told or "time_s"
+    clock, every = clocks_of(record)
+    name = clock or "time_s"
     own = {name, *every}
     if name not in record:
         note = "no column of time: the speed of rotation is not used"
