@@ -11,8 +11,10 @@ import argparse
 import json
 import math
 import os
+import re
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -44,6 +46,18 @@ COMMANDS: dict[str, list[str]] = {
     "effects": ["effects", "--json"],
     "import_fluent": ["import", f"{D}/cfd_exports/screw/report-def-0-rfile.out", "--json"],
     "import_bench": ["import", f"{D}/jmajew/grp01__f1507_hqprop76x8_4s_table1.csv", "--json"],
+    "compare": ["compare", "reports/diagnosis/cfd_reference.csv", "reports/diagnosis/cfd_pitch.csv", "--json"],
+    "compare_case": ["compare", "reports/diagnosis/cfd_reference.csv", "reports/diagnosis/cfd_duct.csv", "--case",
+                     "cases/prop_8x5", "--json"],
+    "fly": ["fly", f"{D}/flight_logs/cf21_brushed_34.7g_jana00.usdlog", "--mass-kg", "0.0347", "--case", "1.8x1.2",
+            "--healthy", f"{D}/flight_logs/cf21_brushed_34.7g_jana02.usdlog",
+            f"{D}/flight_logs/cf21_brushed_34.7g_jana11.usdlog", "--json"],
+    "fly_autopilot": ["fly", f"{D}/flight_logs/air_octoquad_00000012.BIN", "--json"],
+    "fly_px4": ["fly", f"{D}/flight_logs/udesa_quad_cut_15mm_one_blade_log13.ulg.gz", "--json"],
+    "export": ["export", "cases/prop_8x5", "--out", "{out}", "--json", "--format", "table", "jsbsim", "gazebo",
+               "xrotor"],
+    "design": ["design", "--thrust-N", "6", "--airspeed-m-s", "15", "--rpm", "7000", "--diameter-in", "10", "--out",
+               "{out}", "--json"],
 }  # fmt: skip
 
 
@@ -55,10 +69,23 @@ def save(folder: Path, tree: Path, only: list[str]) -> None:
         if only and name not in only:
             continue
         module = [] if words[0].endswith(".py") else ["-m", "bemt"]
-        line = [sys.executable, *module, *(w.format(data=data) for w in words)]
-        done = subprocess.run(line, cwd=tree, capture_output=True, text=True)
-        (folder / f"{name}.json").write_text(done.stdout or json.dumps({"error": done.stderr[-2000:]}))
+        one = {**os.environ, "PYTHONPATH": "", "OPENBLAS_NUM_THREADS": "1"}  # several threads differ in the last digits
+        with tempfile.TemporaryDirectory() as made:
+            line = [sys.executable, *module, *(w.format(data=data, out=f"{made}/out") for w in words)]
+            done = subprocess.run(line, cwd=tree, capture_output=True, text=True, env=one)
+            text = (done.stdout or json.dumps({"error": done.stderr[-2000:]})).replace(made, "made")
+            if "{out}" in words:
+                text = json.dumps({"answer": json.loads(text), "made": in_files(Path(made))})
+        (folder / f"{name}.json").write_text(text)
         print(f"{name}: exit {done.returncode}, {len(done.stdout)} characters", flush=True)
+
+
+def in_files(folder: Path) -> dict[str, list[float]]:
+    """Every number in the texts of a folder, by file; those of a manifest are of sizes and dates."""
+    numbers = re.compile(r"(?<![\w.])[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?(?![\w.])")
+    found = (p for p in sorted(folder.rglob("*")) if p.is_file() and p.name != "manifest.json" and p.suffix != ".png")
+    return {p.relative_to(folder).as_posix(): [float(x) for x in numbers.findall(p.read_text(errors="replace"))]
+            for p in found}  # fmt: skip
 
 
 def leaves(value: Any, where: str = "") -> Iterator[tuple[str, Any]]:

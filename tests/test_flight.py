@@ -596,9 +596,8 @@ def test_a_case_from_flights_is_solved_at_the_speed_flown(flights: Path, tmp_pat
 
 def test_the_table_of_flights_says_what_each_thrust_is_over() -> None:
     """N/kg of a command and N/rpm^2/kg of a speed stand in one column: each says which."""
-    from bemt.tools.flight.actions import _aligned
+    from bemt.tools.flight.actions import _aligned, _Row
 
-    row = {"file": "a", "rotors": 4, "flying_s": 9.0, "verdict": "none", "effects": "", "sensors": "",
-           "thrust_constant": 4.0, "thrust_constant_half": 0.04, "thrust_constant_unit": "N/kg"}  # fmt: skip
-    told = _aligned([{**row, "thrust_over": "command"}, {**row, "thrust_over": "speed^2"}])
+    one = _Row("a", "csv", 4, 9.0, "none", "", "", 4.0, 0.04, "N/kg", "command", None, None, None, "", None, None)
+    told = _aligned([one, replace(one, thrust_over="speed^2")])
     assert [("command" in line, "speed^2" in line) for line in told.splitlines()[1:]] == [(True, False), (False, True)]

@@ -664,7 +664,7 @@ def test_the_manifest_says_what_is_concealed_and_where_it_is_known_from() -> Non
     known = real.manifest()
     assert set(known) == set(real.SETS)
     for entry in known.values():
-        assert set(entry["causes"]) <= set(catalogue()) and entry["how"] and entry["source"]
+        assert set(entry.causes) <= set(catalogue()) and entry.how and entry.source
 
 
 def test_every_set_is_drawn_and_a_control_goes_with_every_claim_on_reynolds(drawn: list[Item]) -> None:

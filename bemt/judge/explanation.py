@@ -10,7 +10,17 @@ from typing import Any
 from bemt.base.document import Documented
 from bemt.physics import effects
 
-__all__ = ["DOUBT", "NONE", "UNKNOWN", "Explanation", "Size", "Sizes"]
+__all__ = ["DOUBT", "NONE", "UNKNOWN", "Explanation", "Prior", "Size", "Sizes"]
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Probability of the kinds of explanation; they add up to one. [1]"""
+
+    none: float
+    single: float
+    pair: float
+    unknown: float
 
 
 @dataclass(frozen=True)

@@ -137,8 +137,8 @@ def import_(
         if out is None:  # no command takes these two: a file keeps them
             hint = f"Add --out {Path(table).with_name('recording.toml').as_posix()}"
             raise InputError(Fault("", "--out", "nothing", "a recording.toml that keeps what you state", hint))
-        facts = told["unit"], told["column"], told["sign"], pole_pairs, density_kg_m3
-        written = write_recording(table, os.fspath(out), *facts, left, rpm, airspeed_m_s).as_posix()
+        facts: dict[str, Any] = {**told, "pole_pairs": pole_pairs, "density_kg_m3": density_kg_m3, "ignore": left}
+        written = write_recording(table, os.fspath(out), rpm=rpm, airspeed_m_s=airspeed_m_s, **facts).as_posix()
         kept, said = written, {}
         names, told, out, left, insist = [written], dict.fromkeys(told, []), None, [], False
     elif insist and measured and out is None and not (pole_pairs or left):
@@ -151,8 +151,7 @@ def import_(
             read = {n: stated.get(n) or load.import_file(n, format, choice) for n in names}
             stated |= {n: cfd_options.filled(one, **of_tables) for n, one in read.items()}
     speed = None if choice.period is None else 60.0 / choice.period
-    made = cfd_options.run_from(names, rpm=speed, revolutions=revolutions, **run, unit=told["unit"],
-                                column=told["column"], sign=told["sign"], ignore=left)  # fmt: skip
+    made = cfd_options.run_from(names, rpm=speed, revolutions=revolutions, **(run | told), ignore=left)
     found = load.import_files(names, format, choice, made, insist, stated)
     if out is not None and found.runs:
         own = made.run.model_copy(update={"files": found.runs[-1].files})

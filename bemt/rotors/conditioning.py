@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.rotors.latents import STEP, Prior, Sensed
+from bemt.rotors.latents import STEP, Prior, Sensed, arrays_of
 from bemt.rotors.population import AT_REST_J, SMALL_IN, Population
 
 Readings = Callable[[Array], Array]
@@ -299,8 +299,6 @@ class ReferenceRun:
     @staticmethod
     def of(document: Mapping[str, Any]) -> ReferenceRun:
         """Reference of a file."""
-        at = Sensed(float(document["at"]["diameter_m"]), *(
-            np.array(document["at"][f.name], dtype=float) for f in fields(Sensed)[1:]
-        ))  # fmt: skip
+        at = Sensed(**arrays_of(document["at"]))
         left, noise = (np.array(document[name], dtype=float) for name in ("left", "noise"))
         return ReferenceRun(at, left, noise, float(document["size"]))

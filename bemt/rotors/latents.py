@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,6 +91,11 @@ class Prior:
             k = NAMES.index(name)
             factor[k] = sd / max(float(self.sd[k]), 1e-12)
         return replace(self, cov=self.cov * np.outer(factor, factor))
+
+
+def arrays_of(document: Mapping[str, Any]) -> dict[str, Any]:
+    """Fields of a file with its lists as arrays."""
+    return {k: np.array(v, dtype=float) if isinstance(v, list) else v for k, v in document.items()}
 
 
 @dataclass(frozen=True, eq=False)

@@ -97,8 +97,8 @@ SENSED = ("J", "alpha_deg", "Re", "f", "top", "T")
 def records() -> dict[str, MeasuredRotor]:
     """Every shipped propeller by the database's name."""
     raw = shipped_arrays("bemt.rotors", "measured.npz")
-    if tuple(raw["latents"]) != NAMES:
-        raise ValueError(f"got latent numbers {raw['latents']}; expected {NAMES}")
+    if (names := tuple(raw["latents"])) != NAMES:
+        raise ValueError(f"got latent numbers {names}; expected {NAMES}")
 
     def one(i: int) -> MeasuredRotor:
         v: dict[str, Any] = {

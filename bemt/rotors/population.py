@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.rotors.latents import KNOWN_FROM, NAMES, Prior, Sensed
+from bemt.rotors.latents import KNOWN_FROM, NAMES, Prior, Sensed, arrays_of
 from bemt.rotors.validity import Validity
 
 SMALL_IN = 7.0
@@ -296,17 +296,14 @@ class Population:
     def of(document: Mapping[str, Any]) -> Population:
         """Population of a file."""
         plain = dict(document)
-        if tuple(plain.pop("latents")) != NAMES:
-            raise ValueError(f"got latent numbers {document['latents']}; expected {NAMES}")
-        if plain.get("validity") is not None:
-            plain["validity"] = Validity.of(plain["validity"])
-        if plain.get("ducted") is not None:
-            plain["ducted"] = Ducted(**{**plain["ducted"], "validity": Validity.of(plain["ducted"]["validity"])})
+        if (names := tuple(plain.pop("latents"))) != NAMES:
+            raise ValueError(f"got latent numbers {names}; expected {NAMES}")
+        if (validity := plain.get("validity")) is not None:
+            plain["validity"] = Validity.of(validity)
+        if (ducted := plain.get("ducted")) is not None:
+            plain["ducted"] = Ducted(**{**ducted, "validity": Validity.of(ducted["validity"])})
         plain["between"] = tuple(plain["between"])
-        plain["families"] = {
-            name: Family(one["offset_deg"], one["offset_sd_deg"], np.array(one["mean"]), np.array(one["cov"]))
-            for name, one in plain["families"].items()
-        }
+        plain["families"] = {name: Family(**arrays_of(one)) for name, one in plain["families"].items()}
         return Population(**plain)
 
 

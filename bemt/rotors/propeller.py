@@ -233,8 +233,8 @@ class Propeller:
             text = path_text("second", second)
             is_case = Path(text).exists() or text.endswith(".toml") or "/" in text
             given["case" if is_case else "label"] = Path(text).resolve().as_posix() if is_case else text
-        written = dict(self.case.written)
-        unknowns = [item for item in written.pop("assumptions", []) if not item["key"].startswith("second_rotor.")]
+        written = {key: value for key, value in self.case.written.items() if key != "assumptions"}
+        unknowns = self.case.declared(lambda key: not key.startswith("second_rotor."))
         table = {"second_rotor": {key: value for key, value in given.items() if value is not None}}
         text = tomlkit.dumps(written | table | ({"assumptions": unknowns} if unknowns else {}))
         keys = {f"second_rotor.{key}": key for key in given} | {
@@ -410,8 +410,9 @@ class Propeller:
         if not isinstance(given, Mapping):
             expected = "a mapping of dotted keys to values"
             raise InputError(Fault("", "changes", repr(changes), expected, 'As in {"blade.pitch_in": 6}'))
-        written = dict(self.case.replaced(changes).written)
-        unknowns = [item for item in written.pop("assumptions", []) if item["key"] not in changes]
+        case = self.case.replaced(changes)
+        written = {key: value for key, value in case.written.items() if key != "assumptions"}
+        unknowns = case.declared(lambda key: key not in changes)
         text = tomlkit.dumps(written | ({"assumptions": unknowns} if unknowns else {}))
         return Propeller(case_of(text, self.case.folder), text)
 

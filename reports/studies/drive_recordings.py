@@ -159,14 +159,10 @@ def compare(path: str, out: str | None = None) -> tuple[dict[str, Any], str]:
         wanted = ("jmajew gemfan", "jmajew hqprop6x4x3", "xNova ramp", "MIT 10", "MIT 14")
         shown = [m for name in wanted for m in found if m.name.startswith(name)]
         panels = [
-            {
-                "title": m.name,
-                "x": "pulse width [µs]",
-                "y": "thrust [N]",
-                "series": [("model", *_sorted(m.pulse_us, m.model_N), "-"), ("recorded", m.pulse_us, m.thrust_N, "o")],
-            }
+            outputs.Panel("pulse width [µs]", "thrust [N]", [
+                ("model", *_sorted(m.pulse_us, m.model_N), "-"), ("recorded", m.pulse_us, m.thrust_N, "o")], m.name)
             for m in shown
-        ]
+        ]  # fmt: skip
         write_atomic(results / "maps.png", outputs.curves(panels))
     return document, text
 

@@ -43,7 +43,7 @@ _PROPELLER: dict[str, tuple[str, str, float]] = {
     "10*KQ": ("CQ", "-", 0.1), "eta0": ("eta", "-", 1.0),
 }  # fmt: skip
 """Columns of ``propellerInfo``: channel, unit, factor."""
-_PART = re.compile(r"(?P<base>\w+)_(?P<part>\w+)_(?P<axis>[xyz])_(?P<unit>Nm?)")
+_PART = re.compile(r"(\w+)_(\w+)_([xyz])_(Nm?)")
 _EXPECTED = "a header such as # Time total_x total_y total_z"
 _VECTOR = re.compile(r"\(\s*((?:\w+_[xyz]\s*){3})\)")
 
@@ -176,11 +176,10 @@ def _record(
 
 def _totals(columns: list[Column], table: ExportTable, notes: list[str]) -> tuple[list[Column], ExportTable]:
     """Sums over pressure, viscous and porous: added in the old layout, compared with the totals of the new one."""
-    loads = [(m, k) for k, c in enumerate(columns) if (m := _PART.fullmatch(c.name))]
-    by_name = {m[0]: table.values[:, k] for m, k in loads}
+    loads = [(m.groups(), table.values[:, k]) for k, c in enumerate(columns) if (m := _PART.fullmatch(c.name))]
     more: dict[Column, Array] = {}
-    for base, axis, unit in dict.fromkeys((m["base"], m["axis"], m["unit"]) for m, _ in loads):
-        own = {m["part"]: by_name[m[0]] for m, _ in loads if (m["base"], m["axis"]) == (base, axis)}
+    for base, axis, unit in dict.fromkeys((base, axis, unit) for (base, _, axis, unit), _ in loads):
+        own = {part: v for (of, part, along, _), v in loads if (of, along) == (base, axis)}
         total, name = own.pop("total", None), f"{base}_total_{axis}_{unit}"
         with np.errstate(over="ignore", invalid="ignore"):
             whole = np.sum([*own.values()], axis=0) if own else np.nan

@@ -375,7 +375,7 @@ def _join(runs: list[Dataset], files: Sequence[str]) -> Dataset:
         return runs[0]
     whole = concat(runs, "+".join(files))
     about = {
-        "file": whole.name, "sha256": "+".join(run.provenance["sha256"] for run in runs), "format": KIND,
+        "file": whole.name, "sha256": "+".join(run.sha256 for run in runs), "format": KIND,
         "headings": {k: v for run in runs for k, v in run.headings.items()},
     }  # fmt: skip
     number = np.repeat(np.arange(1.0, len(runs) + 1.0), [len(run) for run in runs])

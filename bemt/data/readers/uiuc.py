@@ -34,7 +34,7 @@ import os
 import re
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -163,10 +163,20 @@ def _choose_geometry(name: UiucName, own: Mapping[str, tuple[UiucName, UiucGeome
     return replace(geometry, beta_deg=geometry.beta_deg + turn, origin=origin, rotation_deg=turn)
 
 
+@dataclass
+class _Parts:
+    """Tables of a propeller by the role of their file, and the roles whose file was refused."""
+
+    geom: list[Any] = field(default_factory=list)
+    thick: list[Any] = field(default_factory=list)
+    static: list[Any] = field(default_factory=list)
+    line: list[Any] = field(default_factory=list)
+    refused: list[str] = field(default_factory=list)
+
+
 def _collect(files: list[tuple[Path, UiucFile]], faults: list[Fault]) -> Iterator[UiucPropeller]:
     """Read the files of one folder and join them to propellers; faults are appended."""
-    # tables of a propeller by the role of their file, and the roles whose file was refused
-    parts: dict[str, dict[str, list[Any]]] = defaultdict(lambda: defaultdict(list))
+    parts: dict[str, _Parts] = defaultdict(_Parts)
     names: dict[str, UiucName] = {}
     counts: dict[str, int] = defaultdict(int)
     for file, told in files:
@@ -180,15 +190,15 @@ def _collect(files: list[tuple[Path, UiucFile]], faults: list[Fault]) -> Iterato
             table = _READERS[told.role](file)
         except InputError as error:
             faults.extend(error.faults)
-            own_part["refused"].append(told.role)
+            own_part.refused.append(told.role)
             continue
-        tables = own_part[told.role]
+        tables: list[Any] = getattr(own_part, told.role)
         if told.role in ("geom", "thick") and tables:
             got = f"a second {told.role} table for {name.name}"
             faults.append(Fault(os.fspath(file), "", got, "one", f"{tables[0].file} is used"))
             continue
         tables.append(table)
-    own = {key: (names[key], found["geom"][0]) for key, found in parts.items() if found["geom"]}
+    own = {key: (names[key], found.geom[0]) for key, found in parts.items() if found.geom}
     for key, name in sorted(names.items()):
         folder = os.fspath(next(file for file, told in files if told.propeller.name == key).parent)
         if name.faults:
@@ -199,17 +209,17 @@ def _collect(files: list[tuple[Path, UiucFile]], faults: list[Fault]) -> Iterato
         if key == name.family or name.diameter_in is None:  # the design of a family is no propeller of its own
             continue
         found = parts[key]
-        if not (found["geom"] or found["static"] or found["line"]):
+        if not (found.geom or found.static or found.line):
             continue
-        thickness = found["thick"] or (parts[name.family]["thick"] if name.family in parts else [])
+        thickness = found.thick or (parts[name.family].thick if name.family in parts else [])
         yield UiucPropeller(
             name=key, family=name.family, label=FAMILIES.get(name.family.lower(), name.family), folder=folder,
             diameter_in=name.diameter_in, pitch_in=name.pitch_in, angle_deg=name.angle_deg, blades=name.blades,
             blades_from=name.blades_from, rotation=name.rotation, specimen=name.specimen,
             # a refused geometry is not quietly replaced by another
-            geometry=None if "geom" in found["refused"] else _choose_geometry(name, own),
-            thickness=thickness[0] if thickness else None, statics=tuple(found["static"]),
-            lines=tuple(sorted(found["line"], key=lambda line: (line.rpm, line.file))),
+            geometry=None if "geom" in found.refused else _choose_geometry(name, own),
+            thickness=thickness[0] if thickness else None, statics=tuple(found.static),
+            lines=tuple(sorted(found.line, key=lambda line: (line.rpm, line.file))),
         )  # fmt: skip
 
 

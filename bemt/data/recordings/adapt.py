@@ -22,7 +22,7 @@ from bemt.data.readers.references import Reference
 from bemt.data.readers.samples import Channel, dataset
 from bemt.data.readers.slices import Slices
 from bemt.data.recordings.cfd_files import EXPORT
-from bemt.data.recordings.channels import named
+from bemt.data.recordings.channels import clocks_of, named
 from bemt.data.recordings.check import Finding, check
 from bemt.data.recordings.reduce import reduce
 from bemt.physics.dataset import Dataset
@@ -282,8 +282,9 @@ def averaged(record: Dataset, period: float, revolutions: int | None = None) -> 
     >>> round(mean.value, 9), mean.over
     (2.0, 'last 2 revolutions (2 to 4 s, 200 rows)')
     """
-    name = record.provenance.get("time_channel", "time_s")
-    own = {name, *record.provenance.get("clock_channels", "").split("\t")}
+    clock, every = clocks_of(record)
+    name = clock or "time_s"
+    own = {name, *every}
     if name not in record:
         note = "no column of time: the speed of rotation is not used"
         return replace(record, notes=(*record.notes, note))

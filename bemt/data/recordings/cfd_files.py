@@ -14,6 +14,7 @@ from bemt.base.averaging import MIN_ROWS, keep_last, relation, revolution_averag
 from bemt.base.errors import Fault, InputError
 from bemt.data import readers
 from bemt.data.readers.split import some
+from bemt.data.recordings.channels import clocks_of
 from bemt.physics.dataset import Dataset
 
 PROGRAMS: Mapping[str, str] = {
@@ -136,8 +137,8 @@ def home_of(name: str, record: Dataset) -> tuple[str, str, tuple[str, ...]]:
 
 def clock_of(record: Dataset) -> tuple[Array, Array]:
     """Steps (times where none are counted) and times of a history; empty: none."""
-    time = str(record.provenance.get("time_channel", ""))
-    names = [n for n in record.provenance.get("clock_channels", "").split("\t") if n in record and n != time]
+    time, every = clocks_of(record)
+    names = [n for n in every if n in record and n != time]
     times = record[time] if time in record else np.empty(0)
     return (record[names[0]] if names else times), times
 
@@ -163,7 +164,7 @@ def settled(
     clock = record.clock
     coarse = ""
     if clock == "time":
-        time = record[record.provenance["time_channel"]]
+        time = record[clocks_of(record)[0]]
         index, _ = keep_last(time)
         index = index[time[index] <= end * (1.0 + 1e-9)]
         step = float(np.median(np.diff(time[index]))) if index.size > 1 else 0.0

@@ -22,6 +22,7 @@ from bemt.data.readers.headings import CELLS, channel_of, heading, may_be_shaft_
 from bemt.data.readers.unit_text import BY_THE_CASE
 from bemt.data.recordings.cfd_files import Settled, settled, zone_of
 from bemt.data.recordings.cfd_setup import FLIES, Elsewhere
+from bemt.data.recordings.channels import clocks_of
 from bemt.physics.dataset import Dataset
 
 _ALONG = 3.0  # a thrust stands out of the side forces by this factor, or the shaft is not along an axis
@@ -103,7 +104,7 @@ def columns_of(file: str, record: Dataset, several: bool) -> list[LoadColumn]:
     """Columns of one file that may be loads or say something of them."""
     form = record.format
     home = zone_of(Path(file), form) if several else ""
-    clock = {*record.provenance.get("clock_channels", "").split("\t"), record.provenance.get("time_channel", "")}
+    clock = {clocks_of(record)[0], *clocks_of(record)[1]}
     out = []
     for name in record.values:
         if name in clock or _ASIDE.match(name) or (form == "flow360_forces" and re.match(r"Disk\d+_Blade", name)):

@@ -29,7 +29,7 @@ from bemt.data.readers.split import decimal_mark, some, split_table
 from bemt.data.readers.unit_text import BY_THE_CASE, TWO_MEANINGS, unit_for
 from bemt.data.recordings.cfd_files import home_of
 from bemt.data.recordings.cfd_loads import DUCT
-from bemt.data.recordings.channels import named
+from bemt.data.recordings.channels import named, names_of
 from bemt.physics.dataset import Dataset
 
 Facts = dict[str, str | int]
@@ -382,7 +382,7 @@ def _read_as(file: str) -> dict[str, str]:
         found = named(generic_csv.read(file))
     except InputError:
         return {}
-    own: Mapping[str, str] = found.provenance["names"]
+    own = names_of(found)
     return {units.split_suffix(name)[0]: found.headings[was] for name, was in own.items() if was in found.headings}
 
 
@@ -469,11 +469,11 @@ def stated_frame(frame: Any, unit: Iterable[str] = (), column: Iterable[str] = (
     refuse(faults)
     out = frame.rename(columns=str)
     for quantity, facts in columns.items():
-        told = units.UNITS[str(facts["unit"])]
+        own, told = facts["column"], units.UNITS[str(facts["unit"])]
         turning = CHANNELS[quantity] == "angular_speed"
         factor = float(facts.get("sign", 1)) * (told.factor / units.RPM if turning else 1.0)
-        out[facts["column"]] = out[facts["column"]] * factor
-        out = out.rename(columns={facts["column"]: quantity if turning else f"{quantity}_{told.suffix}"})
+        out[own] = out[own] * factor
+        out = out.rename(columns={own: quantity if turning else f"{quantity}_{told.suffix}"})
     return out
 
 

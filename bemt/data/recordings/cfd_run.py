@@ -406,7 +406,7 @@ def _dataset(work: OpenRun, points: _Points, read: Sequence[tuple[str, Dataset]]
     each = values.get("cells", values.get("cell_size"))  # h^-3
     conditions = _conditions(work, read, values.get("cells"), drift.get("thrust_N"))
     labels = next((tuple(r.texts["name"]) for _, r in read if len(r.texts.get("name", ())) == rows), ())
-    sha256 = "+".join(str(r.provenance.get("sha256", "")) for _, r in read)
+    sha256 = "+".join(r.sha256 for _, r in read)
     about: dict[str, Any] = {"file": name, "format": "cfd_run", "sha256": sha256}
     if rows == 1:
         about["means"] = {k: Mean(float(full[k][0]), over, drift.get(k)) for k, over in averaged.items()}

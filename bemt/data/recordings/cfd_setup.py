@@ -258,7 +258,7 @@ def references_of(run: Dataset, where: str) -> list[Reference]:
     out = []
     setup = {"thrust_from": "forces", **stated_of(run)}
     loads = (("thrust", "thrust_N", "N"), ("torque", "torque_Nm", "N m"), ("duct_thrust", "duct_thrust_N", "N"))
-    sha256 = str(run.provenance.get("sha256", ""))
+    sha256 = run.sha256
     for quantity, channel, unit in (*loads, ("CT", "CT", "-"), ("CQ", "CQ", "-")):
         for i in range(len(run) if channel in run else 0):
             value = float(run[channel][i])

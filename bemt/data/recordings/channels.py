@@ -89,9 +89,21 @@ def dropped(d: Dataset) -> tuple[DroppedCells, ...]:
     return tuple(d.provenance.get("dropped", ()))
 
 
+def names_of(d: Dataset) -> Mapping[str, str]:
+    """Names that the file has for channels."""
+    found: Mapping[str, str] = d.provenance.get("names", {})
+    return found
+
+
 def file_name(d: Dataset, channel: str) -> str:
     """Name that the file has for a channel."""
-    return str(d.provenance.get("names", {}).get(channel, channel))
+    return names_of(d).get(channel, channel)
+
+
+def clocks_of(d: Dataset) -> tuple[str, tuple[str, ...]]:
+    """Channel that counts the time of a history, "" without one, and all that count its rows: times and steps."""
+    every = str(d.provenance.get("clock_channels", "")).split("\t")
+    return str(d.provenance.get("time_channel", "")), tuple(filter(None, every))
 
 
 def stated(d: Dataset) -> dict[str, Array]:
@@ -107,7 +119,7 @@ def in_one_step(d: Dataset) -> str:
 
 def runs_of(d: Dataset) -> Array:
     """Run of each row, (N,), from 1; 0 where the file has a gap."""
-    return np.nan_to_num(d["run"]) if "run" in d else np.ones(len(d))
+    return np.nan_to_num(d.run) if "run" in d else np.ones(len(d))
 
 
 def named(d: Dataset) -> Dataset:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.data.recordings.channels import named
+from bemt.data.recordings.channels import named, names_of
 from bemt.physics.dataset import Dataset
 
 SEVERITIES = ("error", "warning", "note")
@@ -169,7 +169,7 @@ def check_for(name: str) -> Callable[[Check], Check]:
 def _without_spikes(rec: Dataset) -> Dataset:
     """Channels without their flagged spikes: what one row misread is no contradiction of the recording."""
     values = dict(rec.values)
-    for channel, own in rec.provenance["names"].items():
+    for channel, own in names_of(rec).items():
         odd = np.array([f"spike of {own}" in flags for flags in rec.flags or ()], dtype=bool)
         if odd.any() and odd.mean() < _SPIKES:
             values[channel] = np.where(odd, np.nan, values[channel])
@@ -185,7 +185,7 @@ def facts_of(
     said, about = source.constants, source.provenance
     own = int(said["blades"]) if "blades" in said else None
     return Facts(
-        rec.values, raw, {k: source.unit(k) for k in raw}, rec.provenance["names"], rec.lines,
+        rec.values, raw, {k: source.unit(k) for k in raw}, names_of(rec), rec.lines,
         diameter_m if diameter_m is not None else said.get("diameter_m"),
         pitch_m if pitch_m is not None else said.get("pitch_m"), blades if blades is not None else own,
         ducted or about.get("rotor_ducted") == "yes" or about.get("duct") == "yes", about.get("propeller") == "none",

@@ -356,7 +356,7 @@ def together(parts: Sequence[Dataset], name: str = "") -> CfdRun:
     about = {
         **{k: v for k, v in finest.provenance.items() if k != "means"},
         "file": name or " + ".join(d.name for d in parts),
-        "sha256": "+".join(str(d.provenance.get("sha256", "")) for d in parts),
+        "sha256": "+".join(d.sha256 for d in parts),
     }  # fmt: skip
     _one_study(runs, finest)
     own = {_bare(t) for t in finest.notes}

@@ -31,6 +31,7 @@ from bemt.data.recordings.channels import (
     in_one_step,
     lost,
     named,
+    names_of,
     runs_of,
     shaft_power,
     stated,
@@ -143,7 +144,7 @@ def _joined(parts: Sequence[Dataset]) -> Dataset:
     about = {
         **parts[0].provenance,
         "dropped": sum((dropped(v) for v in parts), ()),
-        "names": {a: b for v in parts for a, b in v.provenance["names"].items()},
+        "names": {a: b for v in parts for a, b in names_of(v).items()},
     }
     return replace(whole, values={**whole.values, "run": np.concatenate(run)}, provenance=about)
 
@@ -339,12 +340,12 @@ def _numbers(series: Dataset, air: AirOfPoints, D: float) -> Dataset:
     if {"CT", "CP"} <= series.values.keys():
         with np.errstate(all="ignore"):
             fm = np.asarray(co.FM(series.CT, series.CP, np.nan_to_num(V)), dtype=float)
-            share = np.hypot(1.5 * series.u["CT"] / series.CT, series.u["CP"] / series.CP)
+            share = np.hypot(1.5 * series.u_CT / series.CT, series.u_CP / series.CP)
         more["FM"], u_more["FM"] = fm, np.abs(fm * share)
     if {"thrust_N", "power_W"} <= series.values.keys():
         with np.errstate(all="ignore"):
             ratio = np.where(series.power_W > 0, series.thrust_N / series.power_W, np.nan)
-            share = np.hypot(series.u["thrust_N"] / series.thrust_N, series.u["power_W"] / series.power_W)
+            share = np.hypot(series.u_thrust_N / series.thrust_N, series.u_power_W / series.power_W)
         more["efficacy_N_W"], u_more["efficacy_N_W"] = ratio, np.abs(ratio * share)
     u_more = {k: np.where(np.isfinite(v), v, np.nan) for k, v in u_more.items()}
     return replace(series, values={**series.values, **more}, u={**series.u, **u_more})

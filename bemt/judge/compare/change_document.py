@@ -361,10 +361,10 @@ def _said(doc: ComparedRuns) -> list[str]:
     if density and abs(density - 1.0) > 0.003:
         ends = f"Recorded density: {a:.4g} to {b:.4g} kg/m3" if a and b else "Density from the recorded temperatures"
         out.append(f"{ends} ({density - 1:+.1%}).")
-    step = doc.next_measurement
+    text, command = (doc.next_measurement.get(k) for k in ("text", "command"))
     told = (doc.told or ()) if doc.diagnosis else (sentence(doc),)
     said_below = ("Next: ", "bemt ", "if ")
-    out += [t for t in told if not (step.get("text") and t.lstrip().startswith(said_below))]
+    out += [t for t in told if not (text and t.lstrip().startswith(said_below))]
     if not doc.diagnosis and "rpm_scale" in (*doc.effects, *_likely(doc)):
         out += [
             f"A miscount of {m.true}/{m.set} fits: in B, {m.words}; or the inverse in A." for m in _miscounts(doc)[:1]
@@ -376,12 +376,12 @@ def _said(doc: ComparedRuns) -> list[str]:
         moved = [r for r in doc.ratios.values() if r.over_command and not r.low95 < 1.0 < r.high95]
         rest = "what load, voltage or a miscount explains" if moved else "scatter"
         out.append(f"Drive: no change beyond {rest}.")
-    if step.get("text"):
-        out.append(f"Next: {step['text']}.")
+    if text:
+        out.append(f"Next: {text}.")
     out = [textwrap.fill(line, 110, initial_indent="  ", subsequent_indent="    ") for line in out]
-    if step.get("command"):
+    if command:
         out += [f"    {t.strip()}" for t in told if t.lstrip().startswith("if ")]
-        out.append(f"    {step['command']}")
+        out.append(f"    {command}")
     return out
 
 

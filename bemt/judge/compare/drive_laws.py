@@ -20,14 +20,14 @@ from bemt.base.gaussian.whitening import log_density, whitener
 from bemt.judge.compare import smooth_change as fits
 from bemt.judge.compare.matched import FOLLOWS_LOAD, POWER_OF_SPEED, MatchedChannel
 from bemt.judge.compare.smooth_change import Scatter
-from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation, Sizes
+from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation, Prior, Sizes
 from bemt.judge.loss import Decision, decide
 from bemt.physics.effects.base import FORM
 
-PRIOR = {"none": 0.7, "single": 0.2, "pair": 0.05, "unknown": 0.05}
+PRIOR = Prior(none=0.7, single=0.2, pair=0.05, unknown=0.05)
 """Prior probability of the kinds of explanation of a drive, which is judged beside the loads: a cause is half as likely
 as there (declared) [1]."""
-_PRIOR = {NONE: PRIOR["none"], UNKNOWN: PRIOR["unknown"]}
+_PRIOR = {NONE: PRIOR.none, UNKNOWN: PRIOR.unknown}
 SUPPLY = Explanation.of("battery_sag")
 """Another voltage of battery or supply."""
 # What a recorded voltage does at one command and at one speed, powers of its ratio with their standard deviations: the
@@ -186,8 +186,8 @@ def log_density_of_ratios(ratios: Mapping[str, tuple[float, float]], volts: floa
     y = y - by_volts[0] * v - by_load[0] * load.change - [_READ[k] * load.miscount for k in names]
     own = np.diag(unsure**2 + (by_volts[1] * v) ** 2 + (by_load[1] * load.change) ** 2)
     own += load.unsure**2 * np.outer(by_load[0], by_load[0])
-    ways = [(PRIOR["none"], 0.0 * own)]
-    ways += [(PRIOR["unknown"] / len(_UNKNOWN_KINDS), size**2 * np.eye(y.size)) for size, *_ in _UNKNOWN_KINDS]
+    ways = [(PRIOR.none, 0.0 * own)]
+    ways += [(PRIOR.unknown / len(_UNKNOWN_KINDS), size**2 * np.eye(y.size)) for size, *_ in _UNKNOWN_KINDS]
     for row in LAWS:
         if volts is None or row.id not in SUPPLY:
             T = np.array([[w * term.get(k, {}).get("all", 0.0) for k in names] for w, term in row.terms])
@@ -309,8 +309,8 @@ def weigh_factor(c: MatchedChannel, s: Scatter) -> dict[Explanation, float]:
     """Probability that a channel changed by one factor, or nearly so, by what nobody can tell: "doubt"; or not."""
     y, C = c.y - c.y.mean(), fits.covariance(c, s)
     found = [log_density(C + size**2 * fits.steady_change(c), y) for size, *_ in _UNKNOWN_KINDS]
-    none = math.log(PRIOR["none"]) + log_density(C, y)
-    changed = math.log((1.0 - PRIOR["none"]) / len(found)) + float(log_sum(found))
+    none = math.log(PRIOR.none) + log_density(C, y)
+    changed = math.log((1.0 - PRIOR.none) / len(found)) + float(log_sum(found))
     return dict(zip((NONE, DOUBT), shares([none, changed]).tolist(), strict=True))
 
 

@@ -164,7 +164,7 @@ def against_band(case: Case, recordings: Sequence[Dataset]) -> PredictionView:
 
     recorded, model, start = [], [], count
     for d in parts:
-        at = (d["rpm"], d["airspeed_m_s"], d["density_kg_m3"])
+        at = (d.rpm, d.airspeed_m_s, d.density_kg_m3)
         own = [c for c in loads if c in d]
         recorded.append(shown(d.name, at, {c: d[c] for c in own}, {c: d.u[c] for c in own}))
         model.append(predicted(case.name, slice(start, start + len(d)), at))
@@ -180,7 +180,7 @@ def _usable(d: Dataset) -> Dataset:
     if not loads:
         return Dataset("points", d.name, {"rpm": np.zeros(0)}, {})
     keys = ("rpm", "airspeed_m_s", "density_kg_m3")
-    keep = np.all([np.isfinite(d[k]) for k in keys], axis=0) & (d["rpm"] > 0.0)
+    keep = np.all([np.isfinite(d[k]) for k in keys], axis=0) & (d.rpm > 0.0)
     keep &= np.any([np.isfinite(d[c]) for c in loads], axis=0)
     return Dataset("points", d.name, {k: d[k][keep] for k in (*keys, *loads)}, {c: d.u[c][keep] for c in loads})
 

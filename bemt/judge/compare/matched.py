@@ -102,7 +102,7 @@ def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> 
         {k: float(v["session"]) for k, v in reduction(series).correlated.items() if v.get("session")},
         conditions_of(imported),
         _shifts(series, bool(ramp)),
-        (int(false.sum()) + len(gone), (int(np.isfinite(series["rpm"]).sum()) if "rpm" in series else 0) + len(gone)),
+        (int(false.sum()) + len(gone), (int(np.isfinite(series.rpm).sum()) if "rpm" in series else 0) + len(gone)),
         math.nan if (zero := wind_of(imported)) is None else zero,
     )
 
@@ -169,7 +169,7 @@ def _stairs(steady: Dataset, imported: Dataset) -> bool:
     how, rpm = reduction(steady), named(imported).values.get("rpm")
     if rpm is None or "rpm" not in steady:
         return False
-    kept, seen = sum(map(len, how.rows)), (np.log(v[v > 0.0]) for v in (steady["rpm"], rpm))
+    kept, seen = sum(map(len, how.rows)), (np.log(v[v > 0.0]) for v in (steady.rpm, rpm))
     still, every = (float(np.ptp(v)) if v.size else 0.0 for v in seen)
     return still > 0.5 * every and kept > sum(len(gone.lines) for gone in how.dropped if not gone.channel)
 
@@ -285,7 +285,7 @@ class MatchedChannel:
 
 def like_voltage(a: StandRun, b: StandRun) -> bool:
     """Whether motor and controller work at like voltages, so that electrical power may stand for torque."""
-    v = [float(np.nanmedian(r.points["voltage_V"])) if "voltage_V" in r.points else math.nan for r in (a, b)]
+    v = [float(np.nanmedian(r.points.voltage_V)) if "voltage_V" in r.points else math.nan for r in (a, b)]
     return like_volts(v[0], v[1])
 
 
@@ -297,14 +297,27 @@ def like_volts(a: float, b: float) -> bool:
 def advance(run: StandRun, diameter: float) -> Array:
     """V/(n D), or V/n [m] without a diameter; zero where no airspeed was recorded."""
     if "J" in run.points:
-        return np.asarray(np.nan_to_num(run.points["J"]))
+        return np.asarray(np.nan_to_num(run.points.J))
     V = np.nan_to_num(run.points.values.get("airspeed_m_s", np.zeros(len(run))))
     with np.errstate(divide="ignore", invalid="ignore"):
-        turn = V / (run.points["rpm"] / 60.0)
+        turn = V / (run.points.rpm / 60.0)
     return np.asarray(np.nan_to_num(turn / (diameter if math.isfinite(diameter) else 1.0)))
 
 
-def _readings(run: StandRun, name: str, channel: str, diameter: float) -> dict[str, Array] | None:
+@dataclass(frozen=True)
+class _Readings:
+    """N points of one channel in one recording, as in `MatchedChannel`."""
+
+    y: Array
+    x: Array
+    floor: Array
+    u: Array
+    run: Array
+    sign: float
+    lost: int  # Points near zero that were left out
+
+
+def _readings(run: StandRun, name: str, channel: str, diameter: float) -> _Readings | None:
     """Points of one channel in one recording."""
     v = run.points.values.get(channel)
     if v is None or np.isfinite(v).sum() < 2:
@@ -318,11 +331,11 @@ def _readings(run: StandRun, name: str, channel: str, diameter: float) -> dict[s
     if name == "at_power":
         if "electrical_power_W" not in run.points:
             return None
-        speed, to = run.points["electrical_power_W"], 1.0 / 1.5
+        speed, to = run.points.electrical_power_W, 1.0 / 1.5
     else:
         speed = rpm if rpm is not None else np.ones(len(run))
         to = 0.0 if name == "at_command" else POWER_OF_SPEED.get(channel, 0.0)
-    first = run.points["command"] if over_command else np.log(np.where(speed > 0.0, speed, np.nan))
+    first = run.points.command if over_command else np.log(np.where(speed > 0.0, speed, np.nan))
     sign = float(np.sign(np.nansum(v)))
     size = np.where(v * sign > 0.0, v * sign, np.nan)
     top = float(np.nanmax(size)) if np.isfinite(size).any() else math.nan
@@ -335,26 +348,21 @@ def _readings(run: StandRun, name: str, channel: str, diameter: float) -> dict[s
         return None
     stated = run.points.u[channel] / size
     still = over_command or name in WITHOUT_SPEED
-    return {
-        "y": np.log(scaled[good]),
-        "x": np.column_stack([first, np.zeros(len(run)) if still else advance(run, diameter)])[good],
-        "floor": top / size[good],
-        "u": np.nan_to_num(stated[good]),
-        "sign": np.full(int(good.sum()), sign),
-        "run": run.points.values.get("run", np.zeros(len(run)))[good],
-        "lost": np.full(int(good.sum()), float((~good).sum())),
-    }
+    x = np.column_stack([first, np.zeros(len(run)) if still else advance(run, diameter)])
+    runs = run.points.values.get("run", np.zeros(len(run)))
+    return _Readings(np.log(scaled[good]), x[good], top / size[good], np.nan_to_num(stated[good]), runs[good], sign,
+                     int((~good).sum()))  # fmt: skip
 
 
-def _averaged(part: dict[str, Array]) -> dict[str, Array]:
+def _averaged(part: _Readings) -> _Readings:
     """Fewer points where there are many: means of neighbours in speed within a run."""
-    n = part["y"].size
+    n = part.y.size
     if n <= MOST:
         return part
-    order = np.lexsort((part["x"][:, 0], np.round(part["x"][:, 1], 2), part["run"]))
+    order = np.lexsort((part.x[:, 0], np.round(part.x[:, 1], 2), part.run))
     block = np.empty(n, dtype=np.intp)
     block[order] = np.arange(n) * MOST // n
-    starts = np.r_[True, np.diff(part["run"][order]) != 0]
+    starts = np.r_[True, np.diff(part.run[order]) != 0]
     block[order] += np.cumsum(starts)
     _, block = np.unique(block, return_inverse=True)
     count = np.bincount(block)
@@ -362,8 +370,8 @@ def _averaged(part: dict[str, Array]) -> dict[str, Array]:
     def mean(v: Array) -> Array:
         return np.asarray(np.bincount(block, v) / count)
 
-    out = {k: mean(v) for k, v in part.items() if v.ndim == 1}
-    return {**out, "x": np.column_stack([mean(part["x"][:, k]) for k in (0, 1)])}
+    x = np.column_stack([mean(part.x[:, k]) for k in (0, 1)])
+    return replace(part, y=mean(part.y), x=x, floor=mean(part.floor), u=mean(part.u), run=mean(part.run))
 
 
 def matched(a: StandRun, b: StandRun, name: str, diameter: float = math.nan) -> MatchedChannel | None:
@@ -376,30 +384,30 @@ def matched(a: StandRun, b: StandRun, name: str, diameter: float = math.nan) -> 
     channel, one, two = next((t for t in tried if None not in t), ("", None, None))
     if one is None or two is None:
         return None
-    turned = bool(one["sign"][0] != two["sign"][0])
+    turned = one.sign != two.sign
     notes = [f"{channel}: changed sign between A and B; sizes are compared"] if turned else []
     parts = [_averaged(one), _averaged(two)]
     for part, run, letter in zip(parts, (a, b), "AB", strict=True):
-        if part["lost"][0] > 0.5 * len(run):
-            notes.append(f"{channel}: {part['lost'][0]:.0f} of {len(run)} points of {letter} left out: near zero")
+        if part.lost > 0.5 * len(run):
+            notes.append(f"{channel}: {part.lost} of {len(run)} points of {letter} left out: near zero")
     log_density, unsure = density_change(a, b) if name in LOADS and channel not in _COEFFICIENTS else (0.0, 0.0)
     shift = [0.0, log_density]
-    codes = [np.unique(p["run"], return_inverse=True)[1] for p in parts]
+    codes = [np.unique(p.run, return_inverse=True)[1] for p in parts]
     codes[1] = codes[1] + codes[0].max() + 1
     seen = [r.session.get(channel, 0.0) for r in (a, b)]
     return MatchedChannel(
         name,
         channel,
-        np.concatenate([p["y"] - s for p, s in zip(parts, shift, strict=True)]),
-        np.concatenate([p["x"] for p in parts]),
-        np.repeat([False, True], [p["y"].size for p in parts]),
+        np.concatenate([p.y - s for p, s in zip(parts, shift, strict=True)]),
+        np.concatenate([p.x for p in parts]),
+        np.repeat([False, True], [p.y.size for p in parts]),
         np.concatenate(codes),
-        np.concatenate([p["floor"] for p in parts]),
-        np.concatenate([p["u"] for p in parts]),
+        np.concatenate([p.floor for p in parts]),
+        np.concatenate([p.u for p in parts]),
         log_density,
         math.hypot(max(_set_up(name, channel, a, b), *seen), unsure),
         tuple(notes),
-        np.repeat([a.shift.get(channel, 0.0), b.shift.get(channel, 0.0)], [p["y"].size for p in parts]),
+        np.repeat([a.shift.get(channel, 0.0), b.shift.get(channel, 0.0)], [p.y.size for p in parts]),
         turned,
     )
 

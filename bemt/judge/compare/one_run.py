@@ -159,12 +159,12 @@ def compare_run(
             points = replace(points, values={**points.values, channel: np.full(len(points), float(value))})
     full = points.derive(made.diameter_m)
     keep = np.any([np.isfinite(full[k]) for k in ("thrust_N", "torque_Nm") if k in full], axis=0)
-    rows = np.flatnonzero(keep & np.isfinite(full["rpm"]))
+    rows = np.flatnonzero(keep & np.isfinite(full.rpm))
     if not rows.size:
         raise InputError(Fault(name, "", "no point with a speed and a load", "one or more"))
     step = None if progress is None else (lambda i, n, what: progress(f"{what} ({i}/{n})"))
     whole = propagate(
-        made, full["rpm"][rows], full["airspeed_m_s"][rows], full["density_kg_m3"][rows],
+        made, full.rpm[rows], full.airspeed_m_s[rows], full.density_kg_m3[rows],
         angle_deg=_angle(full, rows, made, name), progress=step,
     )  # fmt: skip
     solved = whole.points
@@ -181,7 +181,7 @@ def compare_run(
     out = tuple(_point(full, solved, int(i), k) for k, i in enumerate(rows))
     if made.ducted and computed and "thrust_N" in full and "duct_thrust_N" not in full:
         notes.append(f"thrust: no part of the duct stated; taken for the whole. The rotor's alone is "
-                     f"{float(solved['rotor_thrust_N'][0]):.4g} N by BEMT; --zones says what counts")  # fmt: skip
+                     f"{float(solved.rotor_thrust_N[0]):.4g} N by BEMT; --zones says what counts")  # fmt: skip
     lines: list[AuditLine] = []
     if computed:
         at = int(rows[0])
@@ -189,7 +189,7 @@ def compare_run(
         lines = [*audit_of(imported if len(imported) == len(full) else full, made.diameter_m, pitch, made.ducted,
                            float(made.air().a_sound), at)]  # fmt: skip
         if not is_run(imported):
-            flies = full["airspeed_m_s"][rows] > 0.5
+            flies = full.airspeed_m_s[rows] > 0.5
             notes.insert(0, "u of the file, and " + floor_note(bool(flies.any()), bool(flies.all())))
     notes = [*made.as_built().no_check, *notes]
     known = combined(lines)[1] if lines else math.nan
@@ -229,7 +229,7 @@ def _point(cfd: Dataset, bemt: Dataset, i: int, k: int) -> PointOfRun:
     }
     if "duct_thrust_N" in cfd and "thrust_N" in loads and "duct_share" in bemt:
         T = loads["thrust_N"].cfd  # the total is the rotor's and the duct's: their errors go together
-        share, u = float(cfd["duct_thrust_N"][i]) / T, float(cfd.u["duct_thrust_N"][i]) / abs(T)
+        share, u = float(cfd.duct_thrust_N[i]) / T, float(cfd.u_duct_thrust_N[i]) / abs(T)
         loads["duct_share"] = _load(share, u, bemt, "duct_share", k)
     rpm, V, rho = (float(cfd[key][i]) for key in ("rpm", "airspeed_m_s", "density_kg_m3"))
     J = V / (rpm / 60.0) if rpm > 0 else math.nan

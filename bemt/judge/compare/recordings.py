@@ -273,7 +273,7 @@ def _unloaded(a: StandRun, b: StandRun, diameter: float) -> bool:
     """Whether the rotor takes another load at one command because it meets another wind."""
     if not all("rpm" in run.points for run in (a, b)):
         return False
-    one, two = (advance(run, diameter)[np.isfinite(run.points["rpm"])] for run in (a, b))
+    one, two = (advance(run, diameter)[np.isfinite(run.points.rpm)] for run in (a, b))
     return bool(abs(np.median(two) - np.median(one)) > _OTHER_WIND * max(one.max(), two.max()))
 
 

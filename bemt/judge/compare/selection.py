@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.units import KNOT, MPH, RPM, ZERO_CELSIUS, split_suffix
 from bemt.data.readers.headings import counts_electrical, may_be_shaft_speed, surely_shaft_speed
-from bemt.data.recordings.channels import MEASURED, in_one_step, moves, named
+from bemt.data.recordings.channels import MEASURED, in_one_step, moves, named, names_of
 from bemt.data.recordings.findings import zero_thrust_speed
 from bemt.data.recordings.shown import options_of
 from bemt.physics.air import AIR_C, Air
@@ -189,7 +189,7 @@ def conditions_of(imported: Dataset) -> tuple[str, ...]:
     ('spacing_m',)
     """
     texts = [k for k, v in imported.texts.items() if 1 < len(set(v)) < len(v)]
-    known = {*MEASURED, *named(imported).provenance["names"].values()}
+    known = {*MEASURED, *names_of(named(imported)).values()}
     known |= {k for k in imported.values if k.startswith("u_") or {"err", "rpm", "vibration"} & set(k.split("_"))}
     numbers = [k for k, v in imported.values.items() if k not in known and moves(v)]
     return (*texts, *numbers)
@@ -273,14 +273,14 @@ def wind_of(imported: Dataset) -> float | None:
 
     One of several rotors may be in the slipstream of another.
     """
-    told = named(imported).values
+    told = named(imported)
     if (
         ROTOR in imported.provenance
-        or {"airspeed_m_s", "J", SECOND_ROTOR} & told.keys()
-        or not {"rpm", "thrust_N"} <= told.keys()
+        or {"airspeed_m_s", "J", SECOND_ROTOR} & told.values.keys()
+        or not {"rpm", "thrust_N"} <= told.values.keys()
     ):
         return None
-    return zero_thrust_speed(told["rpm"], told["thrust_N"])
+    return zero_thrust_speed(told.rpm, told.thrust_N)
 
 
 def _no_unit(path: str, heading: str, got: str) -> Fault:

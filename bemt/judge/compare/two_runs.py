@@ -18,10 +18,10 @@ from bemt.base.errors import InputError
 from bemt.base.tables import number_of, number_text, speed_text, text_table
 from bemt.data.recordings.cfd_run import is_run
 from bemt.data.recordings.cfd_setup import (
-    GRID_FLOOR,
     GRID_FLOOR_SOURCE,
     conditions_of,
     conditions_that_differ,
+    grid_floor,
     grid_that_differs,
 )
 from bemt.data.recordings.channels import named
@@ -157,20 +157,19 @@ def compare_runs(a: str, b: str, rows_a: Sequence[str] = (), rows_b: Sequence[st
 
 
 def _told_of_grids(words: str, differ: Mapping[str, tuple[str, str]]) -> tuple[str, ...]:
-    rest = GRID_FLOOR["rest"]
+    thrust, torque = (grid_floor(load, False) for load in ("thrust_N", "torque_Nm"))
     also = {k: v for k, v in differ.items() if k not in ("grid_level", "cells")}
     more = "; ".join(f"{k.replace('_', ' ')} {x} and {y}" for k, (x, y) in also.items())
     return (
         f"{words[0].upper()}{words[1:]}. No physics is named before the grid is the same.",
-        f"The next grid alone changes thrust by {rest['thrust_N']:.0%} and torque by {rest['torque_Nm']:.0%} "
-        f"({GRID_FLOOR_SOURCE}).",
+        f"The next grid alone changes thrust by {thrust:.0%} and torque by {torque:.0%} ({GRID_FLOOR_SOURCE}).",
         *([f"Also: {more}."] if also else []),
     )
 
 
 def _speeds(d: Dataset) -> int:
     """Speeds of rotation that differ by more than a per cent."""
-    known = np.sort(d["rpm"][np.isfinite(d["rpm"]) & (d["rpm"] > 0.0)])
+    known = np.sort(d.rpm[np.isfinite(d.rpm) & (d.rpm > 0.0)])
     return 0 if not known.size else 1 + int(np.sum(np.diff(np.log(known)) > _LIKE))
 
 
@@ -181,7 +180,7 @@ def _airspeed(d: Dataset) -> NDArray[np.float64]:
 def _like(a: Dataset, b: Dataset, i: int) -> NDArray[np.bool_]:
     """Points of B at speed and airspeed of point i of A."""
     V = float(_airspeed(a)[i])
-    near = np.abs(b["rpm"] - a["rpm"][i]) <= _LIKE * a["rpm"][i]
+    near = np.abs(b.rpm - a.rpm[i]) <= _LIKE * a.rpm[i]
     return np.asarray(near & (np.abs(_airspeed(b) - V) <= _LIKE * max(V, 1.0)))
 
 
@@ -208,14 +207,14 @@ def _point(a: Dataset, b: Dataset, i: int, j: int) -> PairedPoint:
         if math.isfinite(x) and math.isfinite(y):
             both = math.hypot(u, w) if math.isfinite(u) and math.isfinite(w) else math.nan
             loads[name] = PairedLoad(x, u, y, w, y - x, both)
-    rho = [float(d["density_kg_m3"][k]) if "density_kg_m3" in d else math.nan for d, k in ((a, i), (b, j))]
-    return PairedPoint(float(a["rpm"][i]), float(_airspeed(a)[i]), (rho[0], rho[1]), loads)
+    rho = [float(d.density_kg_m3[k]) if "density_kg_m3" in d else math.nan for d, k in ((a, i), (b, j))]
+    return PairedPoint(float(a.rpm[i]), float(_airspeed(a)[i]), (rho[0], rho[1]), loads)
 
 
 def _sentence(points: Sequence[PairedPoint], a: Dataset, b: Dataset) -> str:
     loads = next((p.loads for p in points if p.loads), None)
     if loads is None:
-        where = [f"{number_text(d['rpm'][0], 5)} rev/min at {_airspeed(d)[0]:g} m/s" for d in (a, b)]
+        where = [f"{number_text(d.rpm[0], 5)} rev/min at {_airspeed(d)[0]:g} m/s" for d in (a, b)]
         return f"The two runs have no load at equal speed and airspeed: A {where[0]}, B {where[1]}."
     parts = ", ".join(f"{name.split('_')[0]} {load.percent}" for name, load in loads.items())
     sizes = [abs(load.difference) / load.u_both for load in loads.values() if load.u_both > 0.0]

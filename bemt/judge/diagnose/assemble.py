@@ -50,7 +50,7 @@ def _part(record: Record, case: Case, baseline: str) -> Part:
     model = replace(reached, mach_max=top)
     plain = [e for e in model.effects if not bem.acts_on_points(e)]
     flow = bem.flow_of(model.prepared(plain), record.rpm, record.V, record.air, record.extra, model.chord75_m)
-    part = Part(record, model, model.effects, flow, case.content_hash(), tuple(case.get("model.effects_off")))
+    part = Part(record, model, model.effects, flow, case.content_hash(), case.file.model.effects_off)
     if baseline == "bemt":
         return replace(part, as_built=case.as_built(counting_assumptions=False))
     thrust = k1k2_case(case, None, record.rpm, record.V, record.air).thrust_N

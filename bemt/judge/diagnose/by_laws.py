@@ -206,7 +206,7 @@ def _record(
     n, recorded, V = rpm / 60.0, math.isfinite(run.density), np.nan_to_num(V)
     rho = np.where(np.isfinite(rho), rho, run.density if recorded else _RHO * density)
     if "J" in points:
-        V = np.nan_to_num(points["J"]) * n * D
+        V = np.nan_to_num(points.J) * n * D
     unit: dict[str, Array | float] = {
         "thrust_N": 1.0, "torque_Nm": 1.0, "power_W": 1.0 / (2.0 * np.pi * n),
         "electrical_power_W": 1.0 / (2.0 * np.pi * n), "CT": rho * n**2 * D**4,

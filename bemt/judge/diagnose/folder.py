@@ -118,11 +118,9 @@ def improved_case(answer: Diagnosis, case: Case, source: str) -> str:
     if not named or not found:
         return ""
     ids = {e.id for e in found}
-    on = [t for t in case.get("model.effects_on") if t.partition("(")[0] not in ids] + [
-        effects.to_text(e) for e in found
-    ]
-    off = [i for i in case.get("model.effects_off") if i not in ids]
-    if "duct" in case.get("model.effects_off") and "duct" in ids and case.ducted:
+    on = [t for t in case.file.model.effects_on if t.partition("(")[0] not in ids] + [effects.to_text(e) for e in found]
+    off = [i for i in case.file.model.effects_off if i not in ids]
+    if "duct" in case.file.model.effects_off and "duct" in ids and case.ducted:
         on = [t for t in on if t.partition("(")[0] != "duct"]  # the case's own duct is there again
     text = tomlkit.parse(source.lstrip("\ufeff"))
     if "model" not in text:

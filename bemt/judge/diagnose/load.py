@@ -56,7 +56,7 @@ def cases_of(given: Sequence[Any], off: Sequence[str], n: int) -> list[Case]:
         known = ", ".join(effects.catalogue())
         raise InputError([Fault("--off", i, "an unknown effect", f"one of {known}") for i in unknown])
     if off:
-        found = [c.replaced({"model.effects_off": [*c.get("model.effects_off"), *off]}) for c in found]
+        found = [c.replaced({"model.effects_off": [*c.file.model.effects_off, *off]}) for c in found]
     return found
 
 
@@ -107,7 +107,7 @@ def load(
         elif _step_responses(imported, rows, points):
             points = replace(_points(imported, rows, path), notes=("short log: every row counts, transients too",))
         if hand:  # a rotor of the other hand: the sign of its torque is the sense of rotation
-            points = replace(points, values={**points.values, "torque_Nm": -points["torque_Nm"]})
+            points = replace(points, values={**points.values, "torque_Nm": -points.torque_Nm})
         made = records.from_series(points, case, correlated)
     turned = ("torque_Nm: negative under load (sense of rotation): sign reversed here",) if hand else ()
     notes = (*made.notes, *turned, *imported.notes, *rows.notes, *_unused(imported, rows, case))
@@ -171,11 +171,11 @@ def _same_rotor(imported: Dataset, case: Case, path: str) -> None:
     if told and abs(told / case.diameter_m - 1.0) > _SAME:
         faults.append(Fault(path, "diameter_m", f"{told:.4g}", f"{case.diameter_m:.4g} as in the case {case.name}",
                             "Case of a different rotor?"))  # fmt: skip
-    v = named(imported).values
-    if {"J", "airspeed_m_s", "rpm"} <= v.keys():
+    v = named(imported)
+    if {"J", "airspeed_m_s", "rpm"} <= v.values.keys():
         with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = v["airspeed_m_s"] / (v["rpm"] / 60.0 * case.diameter_m) / v["J"]
-        ratio = ratio[np.isfinite(ratio) & (v["J"] > _SLOW)]
+            ratio = v.airspeed_m_s / (v.rpm / 60.0 * case.diameter_m) / v.J
+        ratio = ratio[np.isfinite(ratio) & (v.J > _SLOW)]
         if ratio.size and abs(float(np.median(ratio)) - 1.0) > _SAME:
             faults.append(Fault(path, "J", f"airspeed over n D is {np.median(ratio):.3g} times it", "the same number",
                                 "Wrong diameter in the case, or wrong unit of the airspeed?"))  # fmt: skip

@@ -144,10 +144,14 @@ def noise(problem: Problem, ar: float) -> Array:
     return np.asarray(correlation * problem.u[:, None] * problem.u[None, :])
 
 
+def _places(problem: Problem) -> tuple[Array, Array]:
+    """Logarithm of the speed and advance ratio of readings, (M,) each."""
+    return np.log(problem.covariates["rpm"][problem.point]), problem.covariates["J"][problem.point]
+
+
 def discrepancy(problem: Problem) -> Array:
     """Covariance of the solver's own error of relative size 1: smooth in J, nearly constant in speed, (M, M)."""
-    J = problem.covariates["J"][problem.point]
-    n = np.log(problem.covariates["rpm"][problem.point])
+    n, J = _places(problem)
     spread = max(float(np.ptp(J)), 0.6)
     kernel = (1.0 - _MODEL_FINE) * smooth((J, spread * _LENGTH_J)) + _MODEL_FINE * smooth((J, spread * _LENGTH_FINE))
     kernel *= 1.0 - _MODEL_RPM + _MODEL_RPM * smooth((n, _LENGTH_RPM))
@@ -161,8 +165,7 @@ def sessions(problem: Problem) -> Array:
     run = problem.covariates["run"][problem.point]
     if np.ptp(run) == 0.0:
         return np.zeros((run.size, run.size))
-    n = np.log(problem.covariates["rpm"][problem.point])
-    J = problem.covariates["J"][problem.point]
+    n, J = _places(problem)
     kernel = smooth((n, _LENGTH_RPM), (J, _LENGTH_J))
     same = alike(run, problem.channel)
     # a tachometer has no cells: what the speed at a pulse width does from run to run is what the drive does

@@ -128,9 +128,9 @@ def from_series(series: Dataset, case: Case, correlated: Mapping[str, Mapping[st
     got = {key: np.asarray(v, dtype=float) for key, v in filled.values.items()}
     loads = _loads_of(series, got, notes)
     measured: dict[str, Array] = {k: got[k].copy() for k in loads}
-    rpm = got["rpm"].copy()
+    rpm = filled.rpm.copy()
     if "airspeed_m_s" in got:
-        V = got["airspeed_m_s"].copy()
+        V = filled.airspeed_m_s.copy()
     else:
         V = np.full(n, case.airspeed_m_s)
         notes.append(f"airspeed: not recorded; {case.airspeed_m_s:g} m/s of the case")

@@ -90,7 +90,7 @@ def write(
     blade.pop("as_built", None)
     blade["as_built"] = {"file": POSTERIOR}
     settled = SETTLED - {"rotor.hub_ratio"}
-    kept = [item for item in case.written.get("assumptions", []) if item["key"] not in settled]
+    kept = case.declared(lambda key: key not in settled)
     source.pop("assumptions", None)
     if kept:
         array = tomlkit.aot()

@@ -94,7 +94,7 @@ class Bench:
         if not self._tangents:
             quiet, world = StandErrors(), self.plain()
             base = self.measure(world, quiet)[1]
-            rows = replace(self.rows, rpm=self.rows.rpm * (1.0 + FREEDOM["rpm"]))
+            rows = replace(self.rows, rpm=self.rows.rpm * (1.0 + FREEDOM.rpm))
             faster = Bench(self.rig, self.plan, rows, _starts=self._starts)
             found = [self.measure(changed, quiet)[1] for changed in freedom(world).values()]
             names = [n for n in base if n not in ("rpm", "airspeed_m_s", "time_s")]
@@ -149,10 +149,10 @@ def hidden(
     stand = _quality(rng, kind == "mismatch")
     # no two blades and no two stands are alike: half of the freedom that a diagnosis must allow for
     section = SectionPhysics(
-        drag_level=1.0 + 0.5 * FREEDOM["drag"] * rng.standard_normal(),
-        slope_level=1.0 + 0.5 * FREEDOM["slope"] * rng.standard_normal(),
+        drag_level=1.0 + 0.5 * FREEDOM.drag * rng.standard_normal(),
+        slope_level=1.0 + 0.5 * FREEDOM.slope * rng.standard_normal(),
     )
-    world = replace(bench.plain(), section=section, pitch_offset=0.5 * FREEDOM["pitch"] * float(rng.standard_normal()))
+    world = replace(bench.plain(), section=section, pitch_offset=0.5 * FREEDOM.pitch * float(rng.standard_normal()))
     if kind == "mismatch":
         world = bench.plain()
     more = np.random.default_rng((seed, 1))

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import csv
 import tomllib
-from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -50,44 +50,79 @@ class PairOf:
     case: Mapping[str, Any] | None = None  # Label of the rotor, for a case
 
 
-@cache
-def _manifest() -> Mapping[str, Any]:
-    return tomllib.loads(Path(__file__).with_name("pairs.toml").read_text(encoding="utf-8"))
+@dataclass(frozen=True)
+class _Recorded:
+    """Recordings of the manifest that are read alike."""
+
+    file: str
+    names: Sequence[str]
+    called: str = "{}"
+    where: Sequence[Mapping[str, str]] = ({},)  # Cells of the rows of each; the last holds for those that follow
+    rows: Sequence[str] = ()
+    # A plain table: channel to heading, and factor in it, or to number of the column; of a loop one half
+    table: Mapping[str, str] = field(default_factory=dict)
+    scale: Mapping[str, float] = field(default_factory=dict)
+    numbered: Mapping[str, int] = field(default_factory=dict)
+    half: str = ""
+    constant: Mapping[str, float] = field(default_factory=dict)
+    mass_kg: float | None = None
+
+
+@dataclass(frozen=True)
+class _Changed:
+    """Pairs of the manifest that differ by the same thing."""
+
+    set: str
+    ab: Sequence[tuple[str, str]]
+    causes: Sequence[str]
+    reason: str
+    alike: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class _Labelled:
+    """Sets that are asked again with a case of a label."""
+
+    sets: Sequence[str]
+    only: str
+    case: Mapping[str, Any]
 
 
 @cache
-def _recordings() -> Mapping[str, Mapping[str, Any]]:
+def _manifest(table: str) -> Sequence[Mapping[str, Any]]:
+    found: Sequence[Mapping[str, Any]] = tomllib.loads(
+        Path(__file__).with_name("pairs.toml").read_text(encoding="utf-8")
+    )[table]
+    return found
+
+
+@cache
+def _recordings() -> Mapping[str, _Recorded]:
     """Name of a recording to how it is read."""
-    out = {}
-    for group in _manifest()["recordings"]:
-        conditions = group.get("where", [{}])
-        for k, name in enumerate(group["names"]):
-            where = conditions[min(k, len(conditions) - 1)]
-            out[str(group.get("as", "{}")).format(name)] = {**group, "path": group["file"].format(name), "cells": where}
-    return out
+    groups = [_Recorded(**group) for group in _manifest("recordings")]
+    return {
+        g.called.format(name): replace(g, file=g.file.format(name), where=(g.where[min(k, len(g.where) - 1)],))
+        for g in groups
+        for k, name in enumerate(g.names)
+    }
 
 
 @cache
 def pairs() -> tuple[PairOf, ...]:
     """All pairs of the manifest, those with a label twice."""
     out = []
-    for group in _manifest()["pair"]:
-        for a, b in group["ab"]:
-            one = PairOf(
-                group["set"], a, b, tuple(group["causes"]), tuple(group.get("alike", ())), str(group["reason"])
-            )
-            out.append(one)
-            out += [
-                PairOf(f"{one.kind}, case", a, b, one.causes, one.alike, one.reason, told["case"])
-                for told in _manifest()["labelled"]
-                if one.kind in told["sets"] and told["only"] in a
-            ]
+    labelled = [_Labelled(**told) for told in _manifest("labelled")]
+    for group in (_Changed(**pair) for pair in _manifest("pair")):
+        for a, b in group.ab:
+            out.append(PairOf(group.set, a, b, tuple(group.causes), tuple(group.alike), group.reason))
+            out += [replace(out[-1], kind=f"{group.set}, case", case=told.case)
+                    for told in labelled if group.set in told.sets and told.only in a]  # fmt: skip
     return tuple(out)
 
 
 def pair_files(a: str, b: str) -> dict[str, str] | None:
     """Files of an item that compares two recordings; None where one of them is not found."""
-    places = ((name, root / _recordings()[name]["path"]) for name in (a, b) for root in reversed(data_roots()))
+    places = ((name, root / _recordings()[name].file) for name in (a, b) for root in reversed(data_roots()))
     found = {name: path for name, path in places if path.is_file()}
     if len(found) < len({a, b}):
         return None
@@ -95,24 +130,23 @@ def pair_files(a: str, b: str) -> dict[str, str] | None:
     return {"reference.csv": texts[0], "recording.csv": texts[1], "compare": "A reference, B recording\n"}
 
 
-def _plain(path: Path, how: Mapping[str, Any]) -> dict[str, Array]:
+def _plain(path: Path, how: _Recorded) -> dict[str, Array]:
     """Columns of a plain table, by heading or by number."""
-    if "numbered" in how:
+    if how.numbered:
         rows = np.loadtxt(path)
-        columns = {name: rows[:, k - 1] for name, k in how["numbered"].items()}
+        columns = {name: rows[:, k - 1] for name, k in how.numbered.items()}
     else:
         with path.open(encoding="utf-8-sig", newline="") as stream:
-            read = [row for row in csv.DictReader(stream) if all(row[k] == v for k, v in how["cells"].items())]
-        scale = how.get("scale", {})
+            read = [row for row in csv.DictReader(stream) if all(row[k] == v for k, v in how.where[0].items())]
         columns = {
-            name: np.array([float(row[head]) for row in read]) / scale.get(name, 1.0)
-            for name, head in how["table"].items()
+            name: np.array([float(row[head]) for row in read]) / how.scale.get(name, 1.0)
+            for name, head in how.table.items()
         }
-    if "half" in how:
+    if how.half:
         command = next(iter(columns.values()))
         drop = np.flatnonzero(np.diff(command) < 0.0)
         top = int(drop[0]) + 1 if drop.size else command.size
-        part = slice(0, top) if how["half"] == "up" else slice(top, None)
+        part = slice(0, top) if how.half == "up" else slice(top, None)
         columns = {k: v[part] for k, v in columns.items()}
     if "rpm" in columns:
         good = columns["rpm"] > 0.0
@@ -124,36 +158,36 @@ def _flight(path: Path, mass_kg: float) -> dict[str, Array]:
     """Thrust per propeller of a flight: mass times acceleration along the rotors, averaged over a tenth of a second."""
     from bemt.data.recordings.load import import_file
 
-    v = import_file(path).values
-    flying = (v["rpm"] > 0.5 * np.median(v["rpm"])) & (v["height_m"] > 0.3)
-    block = np.floor(v["time_s"][flying] * 10.0).astype(int)
+    v = import_file(path)
+    flying = (v.rpm > 0.5 * np.median(v.rpm)) & (v.height_m > 0.3)
+    block = np.floor(v.time_s[flying] * 10.0).astype(int)
     _, block = np.unique(block, return_inverse=True)
     count = np.bincount(block)
 
     def mean(x: Array) -> Array:
         return np.asarray(np.bincount(block, x[flying]) / count)
 
-    thrust = mass_kg * mean(v["acceleration_z_m_s2"]) / _PROPELLERS
-    return {"rpm": np.sqrt(mean(v["rpm"] ** 2)), "thrust_N": thrust, "voltage_V": mean(v["voltage_V"])}
+    thrust = mass_kg * mean(v.acceleration_z_m_s2) / _PROPELLERS
+    return {"rpm": np.sqrt(mean(v.rpm**2)), "thrust_N": thrust, "voltage_V": mean(v.voltage_V)}
 
 
-def _read(path: Path, how: Mapping[str, Any]) -> dict[str, Array]:
+def _read(path: Path, how: _Recorded) -> dict[str, Array]:
     """Steady points of one recording, in SI."""
     from bemt.data.recordings.load import import_file
     from bemt.judge.compare.matched import stand_run
     from bemt.judge.compare.selection import selected
 
-    if "mass_kg" in how:
-        columns = _flight(path, float(how["mass_kg"]))
-    elif "table" in how or "numbered" in how:
+    if how.mass_kg is not None:
+        columns = _flight(path, how.mass_kg)
+    elif how.table or how.numbered:
         columns = _plain(path, how)
     else:
-        run = stand_run(selected(import_file(path), how.get("rows", ()), path.name), path.name)
+        run = stand_run(selected(import_file(path), how.rows, path.name), path.name)
         columns = {k: run.points[k] for k in _KEPT if k in run.points}
         if run.command:
-            columns["pulse_width_s" if run.command == "pwm_s" else run.command] = run.points["command"]
+            columns["pulse_width_s" if run.command == "pwm_s" else run.command] = run.points.command
     n = next(iter(columns.values())).size
-    columns |= {k: np.full(n, float(v)) for k, v in how.get("constant", {}).items()}
+    columns |= {k: np.full(n, float(v)) for k, v in how.constant.items()}
     load = [np.isfinite(columns[k]) for k in ("thrust_N", "torque_Nm") if k in columns]
     good = np.any(load, axis=0) & np.isfinite(columns.get("rpm", np.ones(n)))
     return {k: v[good] for k, v in columns.items() if np.isfinite(v[good]).any()}
@@ -205,11 +239,22 @@ MIN_POINTS = 8
 MAX_POINTS = 90
 
 
+@dataclass(frozen=True)
+class Concealed:
+    """One registered set: what is hidden, how, and where that is known from."""
+
+    set: str
+    causes: Sequence[str]
+    how: str
+    source: str
+    alike: Sequence[str] = ()
+
+
 @cache
-def manifest() -> Mapping[str, Mapping[str, Any]]:
+def manifest() -> Mapping[str, Concealed]:
     """Registered sets."""
     text = Path(__file__).with_name("real.toml").read_text(encoding="utf-8")
-    return {entry["set"]: entry for entry in tomllib.loads(text)["concealed"]}
+    return {entry.set: entry for entry in (Concealed(**one) for one in tomllib.loads(text)["concealed"])}
 
 
 SETS = ("real reynolds", "real pitch", "real density", "real slip", "real duct", "real mach", "real null",
@@ -221,7 +266,7 @@ def _item(
     kind: str, rig: str, columns: Mapping[str, Array], case: str, stations: str, variables: list[str],
     reference: Mapping[str, Array] | None = None,
 ) -> Item:  # fmt: skip
-    causes, alike = tuple(manifest()[kind]["causes"]), tuple(manifest()[kind].get("alike", ()))
+    causes, alike = tuple(manifest()[kind].causes), tuple(manifest()[kind].alike)
     n, rows = len(causes), int(next(iter(columns.values())).size)
     # what a table shows to the eye; there is no yardstick for a truth that nobody knows
     entry = Entry(set=kind, causes=causes, strengths=(1.0,) * n, separation=(99.0,) * n, alike=(alike,) * n,

@@ -146,10 +146,21 @@ def full_scales(loads: TrueLoads) -> tuple[float, float]:
     return 1.2 * float(np.nanmax(np.abs(loads.thrust))), 1.2 * float(np.nanmax(np.abs(loads.torque)))
 
 
-# One standard deviation of what nobody knows of a blade and a stand (DIAGNOSIS 2.2): pitch [deg], drag level, lift
-# slope, gains, zeros over full scale, tachometer, density, constants of motor and controller (no case states them).
-FREEDOM = {"pitch": 0.3, "drag": 0.10, "slope": 0.03, "gain": 0.01, "zero": 0.003, "rpm": 0.003, "density": 0.01,
-           "drive": 0.10}  # fmt: skip
+@dataclass(frozen=True)
+class _Freedom:
+    """One standard deviation of what nobody knows of a blade and a stand (DIAGNOSIS 2.2), share where nothing else."""
+
+    pitch: float = 0.3  # [deg]
+    drag: float = 0.10
+    slope: float = 0.03  # Of the lift
+    gain: float = 0.01
+    zero: float = 0.003  # Of full scale
+    rpm: float = 0.003
+    density: float = 0.01
+    drive: float = 0.10  # Constants of motor and controller: no case states them
+
+
+FREEDOM = _Freedom()
 _RELATIVE = {"voltage_V": 0.001, "current_A": 0.004, "pwm_us": 0.002}
 
 
@@ -188,10 +199,10 @@ def freedom(world: World) -> dict[str, World]:
     """Worlds with one thing off by a standard deviation of what nobody knows."""
     section = world.section
     return {
-        "pitch": replace(world, pitch_offset=world.pitch_offset + FREEDOM["pitch"]),
-        "drag": replace(world, section=replace(section, drag_level=section.drag_level * (1.0 + FREEDOM["drag"]))),
-        "slope": replace(world, section=replace(section, slope_level=section.slope_level * (1.0 + FREEDOM["slope"]))),
-        "density": replace(world, density_error=world.density_error + FREEDOM["density"]),
+        "pitch": replace(world, pitch_offset=world.pitch_offset + FREEDOM.pitch),
+        "drag": replace(world, section=replace(section, drag_level=section.drag_level * (1.0 + FREEDOM.drag))),
+        "slope": replace(world, section=replace(section, slope_level=section.slope_level * (1.0 + FREEDOM.slope))),
+        "density": replace(world, density_error=world.density_error + FREEDOM.density),
     }
 
 
@@ -213,13 +224,13 @@ def yardstick(
     wide = cov.copy()
     rows = [np.concatenate([np.nan_to_num(t[c]) if c in t else np.zeros(n) for c in channels]) for t in tangents]
     for k, (value, scale) in enumerate(zip((loads.thrust, loads.torque), scales, strict=True)):
-        for vector in (FREEDOM["gain"] * np.nan_to_num(value), np.full(n, FREEDOM["zero"] * scale)):
+        for vector in (FREEDOM.gain * np.nan_to_num(value), np.full(n, FREEDOM.zero * scale)):
             row = np.zeros(size)
             row[k * n : (k + 1) * n] = vector
             rows.append(row)
     for k, value in enumerate(electric.values(), start=2):
         row = np.zeros(size)
-        row[k * n : (k + 1) * n] = FREEDOM["drive"] * value
+        row[k * n : (k + 1) * n] = FREEDOM.drive * value
         rows.append(row)
     for row in rows:
         wide += np.outer(row, row)

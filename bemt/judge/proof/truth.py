@@ -19,7 +19,6 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 
@@ -239,9 +238,24 @@ def air(temperature_C: Array, pressure_Pa: Array) -> tuple[Array, Array, Array]:
     return rho, 1.716e-5 * (kelvin / 273.15) ** 0.7, np.sqrt(1.4 * 287.05 * kelvin)
 
 
+@dataclass(frozen=True)
+class Around:
+    """What meets the blades of a rotor in its stream, at P points x N elements or what spreads to them."""
+
+    axial: Array = field(default_factory=lambda: np.zeros(1))  # Speed more than the stream's [m/s]
+    tangential: Array = field(default_factory=lambda: np.zeros(1))  # The same against the rotation [m/s]
+    twist: Array = field(default_factory=lambda: np.zeros(1))  # More than the blade's [rad]
+    induction: Array = field(default_factory=lambda: np.ones(1))  # Factor on what the blades induce [1]
+    seal: Array = field(default_factory=lambda: np.ones(1))  # (P,) Share of the images that a duct has at the gap [1]
+    duct: Array | None = None  # (N,) Axial speed of a duct over that of its jet [1]; none: an open rotor
+    # (P,) Head lost behind the lip over the mouth's, and the head ratio that it bears [1]
+    lip: Array | None = None
+    lip_bears: Array | None = None
+
+
 def solve(
     rotor: TruthRotor, rpm: Array, airspeed: Array, temperature_C: Array, pressure_Pa: Array,
-    physics: ts.SectionPhysics | None = None, extra: Mapping[str, Array] | None = None, start: TrueAnswer | None = None,
+    physics: ts.SectionPhysics | None = None, around: Around | None = None, start: TrueAnswer | None = None,
 ) -> TrueAnswer:  # fmt: skip
     """Find circulations and loads at P points at once."""
     rpm, airspeed, temperature, pressure = (
@@ -249,18 +263,16 @@ def solve(
         for v in np.broadcast_arrays(*(np.asarray(v, float) for v in (rpm, airspeed, temperature_C, pressure_Pa)))
     )
     state = [rpm, airspeed, *air(temperature, pressure)]
-    more = dict(extra or {})
-    n = rotor.x.size
-    for key in ("axial", "tangential", "twist", "induction"):
-        more[key] = np.broadcast_to(more.get(key, 1.0 if key == "induction" else 0.0), (rpm.size, n))
-    more["seal"] = np.broadcast_to(more.get("seal", 1.0), rpm.shape)
+    more, shape = around or Around(), (rpm.size, rotor.x.size)
+    spread = {key: np.broadcast_to(getattr(more, key), shape) for key in ("axial", "tangential", "twist", "induction")}
+    more = replace(more, **spread, seal=np.broadcast_to(more.seal, rpm.shape))
     physics = physics or ts.SectionPhysics()
     answer = _solve(rotor, state, physics, more, *_STAGES[0], start)
     for stage in _STAGES[1:]:
         lost = np.flatnonzero(~(answer.residual < _TIGHT))
         if not lost.size:
             break
-        fewer = {k: v if k == "duct" else v[lost] for k, v in more.items()}
+        fewer = replace(more, **{k: v[lost] for k, v in vars(more).items() if k != "duct" and v is not None})
         so_far = replace(answer, **{name: value[lost] for name, value in vars(answer).items()})
         again = _solve(rotor, [v[lost] for v in state], physics, fewer, *stage, so_far)
         for name, value in vars(again).items():
@@ -269,29 +281,24 @@ def solve(
 
 
 def _solve(
-    rotor: TruthRotor,
-    state: list[Array],
-    physics: ts.SectionPhysics,
-    extra: Mapping[str, Array],
-    rounds: int,
-    most: float,
+    rotor: TruthRotor, state: list[Array], physics: ts.SectionPhysics, around: Around, rounds: int, most: float,
     start: TrueAnswer | None,
-) -> TrueAnswer:
+) -> TrueAnswer:  # fmt: skip
     """Iterate circulations, wake and jet of all points; ``most`` is the largest Newton step."""
     rpm, airspeed, rho, mu, sound = state
     R, B, n = rotor.radius, rotor.blades, rotor.x.size
     r, dr = rotor.x * R, np.diff(rotor.edges) * R
     omega = rpm * (2.0 * np.pi / 60.0)
     shape = (rpm.size, n)
-    va = airspeed[:, None] + extra["axial"]
-    vt = omega[:, None] * r + extra["tangential"]
-    twist = rotor.twist + extra["twist"]
-    factor = extra["induction"]
-    ducted = "duct" in extra
+    va = airspeed[:, None] + around.axial
+    vt = omega[:, None] * r + around.tangential
+    twist = rotor.twist + around.twist
+    factor = around.induction
+    ducted = around.duct is not None
     axial_t, swirl_t = wake_tables(rotor.hub, rotor.panels, B, not ducted)
     if ducted:
         image_a, image_s = image_tables(rotor.hub, rotor.panels, B, float(rotor.wall))
-        seal = extra["seal"][:, None, None]
+        seal = around.seal[:, None, None]
     c_r = np.broadcast_to(rotor.chord / r, shape)
     speed_ratio = (omega * R / np.hypot(airspeed, omega * R))[:, None]
 
@@ -330,7 +337,7 @@ def _solve(
             # Bernoulli across the rotor gives the jet: w (V + w/2) = Omega B Gamma / 2 pi, mean over the annulus;
             # it replaces the mean of the open wake's tube
             share = (B * dr * r / np.sum(dr * r))[None, :] / (2.0 * np.pi)
-            per_w = np.asarray(extra["duct"])[None, :, None]
+            per_w = np.asarray(around.duct)[None, :, None]
             ma = ma + (share * (omega * left / np.maximum(airspeed + 0.5 * jet, 1e-3))[:, None])[:, None, :] * per_w
             ma = ma - 0.5 * (share / (h * R)[:, None])[:, None, :]
         ma = ma * factor[:, :, None]
@@ -351,9 +358,9 @@ def _solve(
         fresh = np.sum(ua * weights, axis=1) / np.sum(weights, axis=1)
         if ducted:
             head = B * omega / np.pi * np.sum(gamma * r * dr, axis=1) / np.sum(r * dr)
-            if "lip" in extra:
+            if around.lip is not None and around.lip_bears is not None:
                 mouth = np.maximum(np.sum((va + ua) * r * dr, axis=1) / np.sum(r * dr) - airspeed, 0.0)
-                lost = extra["lip"] / (1.0 + np.exp(-(mouth**2 / extra["lip_bears"] - 4.0) / 0.6))
+                lost = around.lip / (1.0 + np.exp(-(mouth**2 / around.lip_bears - 4.0) / 0.6))
                 # At its onset the loss rises three times as fast as the head that drives it: slow, or it oscillates
                 left = left + 0.15 * (1.0 / (1.0 + lost * mouth**2 / np.maximum(left * head, 1e-9)) - left)
             jet = jet + 0.5 * (np.sqrt(np.maximum(airspeed**2 + left * head, 0.0)) - airspeed - jet)

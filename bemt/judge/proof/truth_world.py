@@ -23,7 +23,6 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
@@ -69,7 +68,7 @@ class _Foil:
 
 def solve(
     rotor: truth.TruthRotor, rpm: Array, airspeed: Array, temperature_C: Array, pressure_Pa: Array,
-    physics: ts.SectionPhysics, extra: Mapping[str, Array],
+    physics: ts.SectionPhysics, around: truth.Around,
 ) -> truth.TrueAnswer:  # fmt: skip
     """Loads of an open rotor in axial flow."""
     try:
@@ -78,12 +77,12 @@ def solve(
         raise InputError(
             Fault("", "wisdem", "a package that is not installed", "CCBlade", "pip install 'bemt[wisdem]'")
         ) from error
-    if "duct" in extra or np.any(extra.get("axial", 0.0)) or np.any(np.asarray(extra.get("induction", 1.0)) != 1.0):
+    if around.duct is not None or np.any(around.axial) or np.any(around.induction != 1.0):
         raise ValueError("CCBlade models uniform axial flow only")
     P, N, R = rpm.size, rotor.x.size, rotor.radius
     rho, mu, sound = truth.air(temperature_C, pressure_Pa)
     omega = rpm * (2.0 * np.pi / 60.0)
-    beta = rotor.twist + np.broadcast_to(extra.get("twist", 0.0), (P, N))
+    beta = rotor.twist + np.broadcast_to(around.twist, (P, N))
     r = rotor.x * R
     W = np.hypot(np.outer(omega, r), airspeed[:, None])
     thrust, torque = np.full(P, np.nan), np.full(P, np.nan)
@@ -282,17 +281,13 @@ def _wall_factor(x: Array, distance: Array) -> Array:
 
 
 def _solve(
-    rotor: truth.TruthRotor,
-    c: Conditions,
-    pressure: Array,
-    world: World,
-    extra: dict[str, Array],
+    rotor: truth.TruthRotor, c: Conditions, pressure: Array, world: World, around: truth.Around,
     start: truth.TrueAnswer | None,
-) -> truth.TrueAnswer:
+) -> truth.TrueAnswer:  # fmt: skip
     v = c.airspeed * np.cos(np.radians(world.oblique))
     if rotor.code == "ccblade":
-        return solve(rotor, c.rpm, v, c.temperature_C, pressure, world.section, extra)
-    return truth.solve(rotor, c.rpm, v, c.temperature_C, pressure, world.section, extra, start)
+        return solve(rotor, c.rpm, v, c.temperature_C, pressure, world.section, around)
+    return truth.solve(rotor, c.rpm, v, c.temperature_C, pressure, world.section, around, start)
 
 
 def loads(
@@ -307,7 +302,7 @@ def loads(
     shape = (c.rpm.size, rotor.x.size)
     twist = np.full(shape, np.radians(world.pitch_offset))
     twist = twist + np.radians(world.untwist) * np.outer(rho * omega**2 / world.untwist_at, _torsion(rotor))
-    extra: dict[str, Array] = {"twist": twist}
+    around = truth.Around(twist=twist)
     span = (1.0 - rotor.hub) * rotor.radius
     leak = np.zeros(c.rpm.size)
     per_v: Array = np.zeros(rotor.x.size)
@@ -315,22 +310,23 @@ def loads(
         per_w, per_v = disk_speeds(duct, rotor.hub, tuple(rotor.x))
         gap = np.where(np.isfinite(c.gap), c.gap, duct.gap * rotor.radius) / span
         leak = world.leak * gap
-        extra |= {"duct": per_w, "seal": seal(gap, world.leak)}
+        around = replace(around, duct=per_w, seal=seal(gap, world.leak))
         if world.lip:
             # suction peak over head of the lip, with the flow that turns into the mouth; separates gradually above 4
             bears = np.full(c.rpm.size, 240.0 * duct.lip_radius)
-            extra |= {"lip": np.full(c.rpm.size, world.lip), "lip_bears": bears}
+            around = replace(around, lip=np.full(c.rpm.size, world.lip), lip_bears=bears)
     if world.ground and np.any(np.isfinite(c.wall)):
-        extra["induction"] = 1.0 + world.ground * (_wall_factor(rotor.x, c.wall / rotor.radius) - 1.0)
+        near = _wall_factor(rotor.x, c.wall / rotor.radius) - 1.0
+        around = replace(around, induction=1.0 + world.ground * near)
     along = c.airspeed * np.cos(np.radians(world.oblique))
     axial = np.outer(along, per_v)
     if world.nacelle:
         # Rankine half body of this radius, its nose half a radius behind the disk: axial speed of its point source
         x2 = rotor.x**2
         axial = axial - np.outer(along, 0.25 * world.nacelle**2 * 0.5 / (x2 + 0.25) ** 1.5)
-    extra["axial"] = axial
+    around = replace(around, axial=axial)
     if world.recirculation or world.blockage or world.inflow_lag or world.oblique:
-        first = start = _solve(rotor, c, pressure, world, extra, start)
+        first = start = _solve(rotor, c, pressure, world, around, start)
         vi = np.nan_to_num(first.induced)
         if world.recirculation:
             stirred = c.since_start / (c.since_start + world.recirculation_time)
@@ -342,9 +338,9 @@ def loads(
         if world.inflow_lag and c.transient:
             late = _two_stage_lag(c.time, vi, world.inflow_lag)
             axial = axial + (late - vi)[:, None]
-        extra["axial"] = axial
+        around = replace(around, axial=axial)
     how = _round if world.oblique else _solve
-    answer = how(rotor, c, pressure, world, extra, start)
+    answer = how(rotor, c, pressure, world, around, start)
     thrust, torque = answer.thrust, answer.torque
     if duct is not None:
         thrust = (thrust + _shroud(rotor, duct, rho, along, per_v, answer)) * (1.0 - 1.3 * leak)
@@ -386,18 +382,14 @@ def _two_stage_lag(time: Array, target: Array, lag: float) -> Array:
 
 
 def _round(
-    rotor: truth.TruthRotor,
-    c: Conditions,
-    pressure: Array,
-    world: World,
-    extra: dict[str, Array],
+    rotor: truth.TruthRotor, c: Conditions, pressure: Array, world: World, around: truth.Around,
     start: truth.TrueAnswer | None,
-) -> truth.TrueAnswer:
+) -> truth.TrueAnswer:  # fmt: skip
     """Mean of eight azimuths of a blade in a stream across the disk.
 
     Induced speed is skewed by 15 pi / 32 tan(chi / 2) r/R cos psi (D. M. Pitt and D. A. Peters, Vertica 5, 1981).
     """
-    first = _solve(rotor, c, pressure, world, extra, start)
+    first = _solve(rotor, c, pressure, world, around, start)
     across = c.airspeed * np.sin(np.radians(world.oblique))
     vi = np.maximum(np.nan_to_num(first.induced), 0.0)
     into = c.airspeed * np.cos(np.radians(world.oblique)) + vi
@@ -407,10 +399,11 @@ def _round(
     skew = 15.0 * np.pi / 32.0 * np.tan(0.5 * chi)
     parts = []
     for psi in np.arange(8) * (np.pi / 4.0):
-        more = dict(extra)
-        more["tangential"] = np.broadcast_to((across * np.sin(psi))[:, None], (c.rpm.size, rotor.x.size))
-        more["axial"] = extra["axial"] + np.outer(vi * skew * np.cos(psi) * feed, rotor.x)
-        more["induction"] = feed[:, None] * np.broadcast_to(extra.get("induction", 1.0), (c.rpm.size, rotor.x.size))
+        more = replace(
+            around, tangential=np.broadcast_to((across * np.sin(psi))[:, None], (c.rpm.size, rotor.x.size)),
+            axial=around.axial + np.outer(vi * skew * np.cos(psi) * feed, rotor.x),
+            induction=feed[:, None] * np.broadcast_to(around.induction, (c.rpm.size, rotor.x.size)),
+        )  # fmt: skip
         parts.append(_solve(rotor, c, pressure, world, more, first))
     return replace(
         first, thrust=np.mean([p.thrust for p in parts], axis=0), torque=np.mean([p.torque for p in parts], axis=0)

@@ -224,6 +224,11 @@ class Dataset:
         return str(self.provenance.get("clock", ""))
 
     @property
+    def sha256(self) -> str:
+        """Sum of that file; empty: none."""
+        return str(self.provenance.get("sha256", ""))
+
+    @property
     def headings(self) -> Mapping[str, str]:
         """Headings of the file by channel, as far as kept."""
         found: Mapping[str, str] = self.provenance.get("headings", {})
@@ -258,10 +263,10 @@ class Dataset:
         return np.asarray(np.all(np.isfinite(loads or list(self.values.values())), axis=0))
 
     def __getattr__(self, channel: str) -> Array:
-        """Access a channel as an attribute, such as ``d.thrust_N``."""
-        values = self.__dict__.get("values", {})
-        if channel in values:
-            return values[channel]  # type: ignore[no-any-return]
+        """Access a channel as an attribute, such as ``d.thrust_N``, and its uncertainty as ``d.u_thrust_N``."""
+        values, name = self.__dict__.get("values", {}), channel.removeprefix("u_")
+        if channel in values or name in values:
+            return values[channel] if channel in values else self.u[name]  # type: ignore[no-any-return]
         raise AttributeError(f"no channel {channel!r}; there are {', '.join(values)}")
 
     def unit(self, channel: str) -> str:

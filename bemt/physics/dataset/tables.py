@@ -153,6 +153,6 @@ def _top(d: Dataset, channel: str, rows: NDArray[np.int_]) -> Array:
     if channel != "eta" or not {"J", "CT"} <= d.values.keys():
         return top
     ducted = "duct_share" in d and np.any(d.duct_share != 0.0)
-    least = 0.0 if ducted else d.CT[rows] - np.nan_to_num(d.u["CT"][rows])
+    least = 0.0 if ducted else d.CT[rows] - np.nan_to_num(d.u_CT[rows])
     limited: Array = np.fmax(value, np.minimum(top, co.eta_limit(d.J[rows], least)))
     return limited

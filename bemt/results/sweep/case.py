@@ -121,7 +121,7 @@ def _formula(case: Case, at: Points) -> tuple[Dataset, Dataset]:
     simple = k1k2_case(case, None, *at.conditions(case), at.angles(case))
     nominal = {"thrust_N": simple.thrust_N, "CT": simple.CT}
     moved = vary(case, nominal, area)
-    u = simple.u["thrust_N"]  # unknown in flight and in a duct
+    u = simple.u_thrust_N  # unknown in flight and in a duct
     parts = {
         "input": {key: np.sqrt(np.sum([one.u[key] ** 2 for one in moved] or [0.0 * v], axis=0))
                   for key, v in nominal.items()},
@@ -155,7 +155,7 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
         nan = math.nan
         rows.append(_row(
             "bemt", "bemt", nominal.thrust_N[i], torque_Nm=nominal.torque_Nm[i], power_W=nominal.power_W[i],
-            CT=nominal.CT[i], CP=nominal.CP[i], u=nominal.u["thrust_N"][i],
+            CT=nominal.CT[i], CP=nominal.CP[i], u=nominal.u_thrust_N[i],
             u_num=_part(nominal, "numerics", "thrust_N", i), u_input=_part(nominal, "input", "thrust_N", i),
             u_model=_part(nominal, "model", "thrust_N", i), thrust_N_range=(np.fmin.reduce(runs), np.fmax.reduce(runs)),
             exhaust_speed_m_s=nominal.exhaust_speed_m_s[i] if case.ducted else nan,
@@ -166,7 +166,7 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
             J=nominal.J[i], flags=tuple(nominal.flags[i]), **state,
         ))  # fmt: skip
         rows.append(_row(
-            "k1k2", "k1k2", simple.thrust_N[i], CT=simple.CT[i], u=simple.u["thrust_N"][i], J=simple.J[i],
+            "k1k2", "k1k2", simple.thrust_N[i], CT=simple.CT[i], u=simple.u_thrust_N[i], J=simple.J[i],
             u_input=_part(fit, "input", "thrust_N", i), flags=tuple(simple.flags[i]), **(state | {"Re": nan}),
         ))  # fmt: skip
         if less is not None:
@@ -321,7 +321,7 @@ def _fan(case: Case, ready: Model, nominal: Dataset) -> Fan:
     loads = ("rotor_thrust_N", "duct_thrust_N", "stator_thrust_N", "duct_share", "mass_flow_kg_s")
     return Fan(
         **{name: float(nominal[name][0]) for name in loads}, exhaust_speed_m_s=v,
-        u_exhaust_speed_m_s=nominal.u["exhaust_speed_m_s"][0], annulus_area_m2=annulus,
+        u_exhaust_speed_m_s=nominal.u_exhaust_speed_m_s[0], annulus_area_m2=annulus,
         exit_area_m2=ready.exit_area_m2, exit_momentum_N=rho * ready.exit_area_m2 * v * (v - case.airspeed_m_s),
         annulus_solidity=ready.solidity * (math.pi / 4.0 * ready.diameter_m**2) / annulus,
         geometric_pitch_speed_m_s=ready.pitch_m * case.rpm / 60.0,

@@ -109,8 +109,9 @@ def _learned(stated: AsBuiltTable, folder: Path) -> CaseAsBuilt | None:
 def _posterior(path: Path) -> CaseAsBuilt:
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
-        if document["schema"] != _SCHEMA or document["latents"] != list(NAMES):
-            raise ValueError(f"schema {document['schema']!r} of {document['latents']}")
+        schema, latents = (document[k] for k in ("schema", "latents"))
+        if schema != _SCHEMA or latents != list(NAMES):
+            raise ValueError(f"schema {schema!r} of {latents}")
         mean, cov, sizes, weights = (np.array(document[k], float) for k in ("mean", "cov", "sizes", "weights"))
         reference = ReferenceRun.of(document["reference"])
         names = document.get("provenance", {}).get("reference", [])

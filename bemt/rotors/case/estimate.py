@@ -84,7 +84,7 @@ def case_of_label(
     if density is not None:
         changes["air.density_kg_m3"] = density
         known.add("air.density_kg_m3")
-    left = [item for item in case.written["assumptions"] if item["key"] not in known]
+    left = case.declared(lambda key: key not in known)
     return with_changes(case, changes | {"assumptions": left}) if changes else case
 
 
@@ -151,12 +151,12 @@ def _of_label(
     points, simple = found.points, k1k2_case(case, None, rpm, V, case.air(), angle)
     columns = {
         "rpm": rpm, "airspeed_m_s": V, "angle_deg": angle,
-        "thrust_N": points.thrust_N, "u_thrust_N": points.u["thrust_N"],
-        "u95_thrust_N": found.half_width95("thrust_N"), "power_W": points.power_W, "u_power_W": points.u["power_W"],
+        "thrust_N": points.thrust_N, "u_thrust_N": points.u_thrust_N,
+        "u95_thrust_N": found.half_width95("thrust_N"), "power_W": points.power_W, "u_power_W": points.u_power_W,
         "u95_power_W": found.half_width95("power_W"), "u_reading_thrust_N": found.u_reading("thrust_N"),
         "u_reading_power_W": found.u_reading("power_W"), "J": points.J, "CT": points.CT, "CP": points.CP,
         "FM": co.FM(points.CT, points.CP, V), "M_tip": points.M_tip, "Re75": points.Re75,
-        "k1k2_thrust_N": simple.thrust_N, "torque_Nm": points.torque_Nm, "u_torque_Nm": points.u["torque_Nm"],
+        "k1k2_thrust_N": simple.thrust_N, "torque_Nm": points.torque_Nm, "u_torque_Nm": points.u_torque_Nm,
         **{key: points.values.get(key, np.where(points.converged, 0.0, np.nan)) for key in HUB_LOADS},
     }  # fmt: skip
     given = EstimateInput(
@@ -224,14 +224,14 @@ class RotorEstimate(Dataset):
                                  "FM", "M_tip")  # fmt: skip
         empty = [key for key in ("J", "FM") if not np.nan_to_num(self.columns[key]).any()]  # all at rest, or in flight
         head, keys = [h for h in head if h not in empty], tuple(k for k in keys if k not in empty)
-        if self.columns["angle_deg"].any():
+        if self.angle_deg.any():
             head[2:2], keys = ["angle [deg]", "H [N]"], (*keys[:2], "angle_deg", "H_force_N", *keys[2:])
         shown = {key: [number_text(x, 2 if key.startswith("u") else 4) for x in self.columns[key]] for key in keys}
-        shown["rpm"] = [speed_text(x) for x in self.columns["rpm"]]
+        shown["rpm"] = [speed_text(x) for x in self.rpm]
         cells = [list(row) for row in zip(*(shown[key] for key in keys), strict=True)]
         at = head.index("T [N]") + 1
         head.insert(at, "T [gf]")
-        for row, thrust in zip(cells, self.columns["thrust_N"], strict=True):
+        for row, thrust in zip(cells, self.thrust_N, strict=True):
             row.insert(at, number_text(1e3 * thrust / KGF, 3))
         g = self.given
         kind = f", {g.blade_class.replace('_', ' ')}" if g.blade_class else ""

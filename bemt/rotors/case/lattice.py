@@ -130,7 +130,7 @@ def solve(
             for origin, part in around.u_by.items()}  # fmt: skip
     found = replace(found, u={}, u_by=u_by)
     rough = np.any([_rough(u / n ** _POWERS.get(key, 0), at) for key, u in around.u.items()], axis=0)
-    rough = np.flatnonzero(rough[cell] | (found.converged & np.isnan(found.u["thrust_N"])))
+    rough = np.flatnonzero(rough[cell] | (found.converged & np.isnan(found.u_thrust_N)))
     return _exact(case, found, rough, density_kg_m3) if rough.size else found
 
 

@@ -211,6 +211,10 @@ class Case:
         """Advance per turn that the case states, NaN where it states none. [m]"""
         return self.file.blade.pitch_m(self.diameter_m)
 
+    def declared(self, keep: Callable[[str], bool]) -> list[dict[str, Any]]:
+        """Entries [[assumptions]] as written, of the keys to keep."""
+        return [item for item in self.written.get("assumptions", ()) if keep(item["key"])]
+
     def get(self, key: str, default: Any = None) -> Any:
         """Value at a dotted key such as ``blade.section.camber``; ``default`` where the case does not hold it."""
         value = value_at(self.file, key)

@@ -47,7 +47,7 @@ class PairError:
         lower = case.second()
         alone, factors, words = [], [], []
         for one, rotor, side in ((case, model.upper, "upper"), (lower, model.lower, "lower")):
-            rpm = found.rpm if side == "upper" else found["lower_rpm"]
+            rpm = found.rpm if side == "upper" else found.lower_rpm
             rpm = np.where(np.isfinite(rpm), rpm, found.rpm)
             met = rotor.solve(rpm, np.nan_to_num(found[f"{side}_onset_m_s"]), air)
             factor, why = validity_of(one, met.J, met.Re75, met.M_tip)

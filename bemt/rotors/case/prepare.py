@@ -246,4 +246,4 @@ def k1k2_case(
     values = {key: v * nan if key in ("thrust_N", "CT") else v for key, v in found.values.items()}
     words = ((why,) if one else () for one in skewed)
     flags = tuple((*f, *more) for f, more in zip(found.flags, words, strict=True))
-    return dataclasses.replace(found, values=values, u={"thrust_N": found.u["thrust_N"] * nan}, flags=flags)
+    return dataclasses.replace(found, values=values, u={"thrust_N": found.u_thrust_N * nan}, flags=flags)

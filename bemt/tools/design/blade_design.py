@@ -336,7 +336,7 @@ def _bands(case: Case, need: Requirement, rpm: Array) -> tuple[BandedLoads, ...]
     density = None if math.isclose(rho, float(case.air().rho), rel_tol=1e-9) else np.full(rpm.size, rho)
     V = np.array([p.airspeed_m_s for p in need.points])
     got = propagate(case, rpm, V, density).points
-    return tuple(BandedLoads(*(float(v[i]) for v in (got.thrust_N, got.u["thrust_N"], got.power_W, got.u["power_W"])))
+    return tuple(BandedLoads(*(float(v[i]) for v in (got.thrust_N, got.u_thrust_N, got.power_W, got.u_power_W)))
                  for i in range(rpm.size))  # fmt: skip
 
 
@@ -450,8 +450,8 @@ def _in_duct(
         changes["blade.section"] = table
     if not changes:
         return case
-    changes["assumptions"] = [a for a in case.written.get("assumptions", ())
-                              if not any(f"{a['key']}.".startswith(f"{done}.") for done in changes)]  # fmt: skip
+    done = tuple(f"{key}." for key in changes)
+    changes["assumptions"] = case.declared(lambda key: not f"{key}.".startswith(done))
     return with_changes(case, changes)
 
 
@@ -484,8 +484,7 @@ def case_files(base: Case, found: search.Optimum, points: Sequence[DesignPoint])
     ]
     if base.ducted:
         kept = tuple(f"{key}." for key in KEYS_KEPT)
-        document["assumptions"] = [dict(a) for a in written.get("assumptions", ()) if a["key"].startswith(kept)
-                                   and a["key"] != "rotor.blades"]  # fmt: skip
+        document["assumptions"] = base.declared(lambda key: key.startswith(kept) and key != "rotor.blades")
     files = {"case.toml": tomlkit.dumps(document).encode(),
              "stations.csv": ("r_over_R,chord_over_R,beta_deg\n" + "\n".join(rows) + "\n").encode()}  # fmt: skip
     return files | new_folder.companions(base)

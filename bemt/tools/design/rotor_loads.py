@@ -97,7 +97,7 @@ def case_of_label(label: str, use: Use = ALONE) -> Case:
     case = case_of(text, ends=False)
     changes: dict[str, Any] = {}
     if use.fluid == "water":
-        kept = [a for a in case.written.get("assumptions", []) if not a["key"].startswith("air.")]
+        kept = case.declared(lambda key: not key.startswith("air."))
         changes = {"air": {"fluid": "water"}, "assumptions": kept, "operating.rpm": 1000.0}
     if use.coaxial:
         changes |= {"second_rotor": {"z_over_D": PAIR_SPACING}}

@@ -410,16 +410,16 @@ class _Chain:
 
 
 def _chain(loads: RotorLoads, machines: Sequence[KnownMotor], target: Target, draws: int = DRAWS) -> _Chain:
-    share = {
+    drawn = {
         name: np.interp(u[: draws + 1], [0.0, 0.5, 1.0], [item.low, item.value, item.high])
         for (name, item), u in zip(SHARES.items(), _draws()[1], strict=True)
     }
-    sag, idle, lost = share["sag"], share["idle_share"], share["drop"]
+    sag, idle, lost, scale = (drawn[name] for name in ("sag", "idle_share", "drop", "size"))
     kv, told, no_load, mass = (
         np.array([[getattr(m, f)] for m in machines]) for f in ("kv", "resistance_ohm", "no_load_A", "mass_g")
     )
     k, loaded = 30.0 / (math.pi * kv), (1.0 - sag) * target.voc
-    size = np.exp(share["size"] * np.where(np.isnan(mass), 1.0, SCATTER_MASS / SCATTER))
+    size = np.exp(scale * np.where(np.isnan(mass), 1.0, SCATTER_MASS / SCATTER))
     lost, rest = np.where(np.isnan(told), 0.0, lost), loads.rest or loads
     full = np.minimum((0.9 - lost) * loaded / k * 30.0 / math.pi, rest.rpm[-1])
     for _ in range(80):

@@ -175,6 +175,11 @@ class BenchMap:
     points: Dataset | None = field(default=None, repr=False)  # what it was fitted to
 
     @property
+    def thrust(self) -> Curve:
+        """Curve of the thrust, which every map has."""
+        return self.curves["thrust"]
+
+    @property
     def with_voltage(self) -> bool:
         """Whether the voltage is a parameter."""
         return any(curve.exponent != 0.0 for curve in self.curves.values())
@@ -182,13 +187,13 @@ class BenchMap:
     @property
     def pulse_range_us(self) -> tuple[float, float]:
         """Recorded range of the pulse width. [us]"""
-        nodes = self.curves["thrust"].pulse_us
+        nodes = self.thrust.pulse_us
         return float(nodes[0]), float(nodes[-1])
 
     @property
     def full_thrust_N(self) -> float:
         """Thrust at the greatest pulse width and the reference voltage. [N]"""
-        return float(self.curves["thrust"].values[-1])
+        return float(self.thrust.values[-1])
 
     def voltage_at(self, pulse_us: ArrayLike) -> Array:
         """Voltage recorded with a pulse width (battery sag); NaN without a record, (N,) [V]."""
@@ -212,7 +217,7 @@ class BenchMap:
 
     def pulse_for(self, thrust_N: ArrayLike, voltage_V: ArrayLike | None = None) -> Array:
         """Inverse map: the least pulse width that gives a thrust, (N,) [us]."""
-        curve = self.curves["thrust"]
+        curve = self.thrust
         wanted = np.atleast_1d(np.asarray(thrust_N, dtype=float))
         scale = np.ones(wanted.shape)
         if voltage_V is not None:
@@ -375,7 +380,7 @@ def repeat_spread(points: Dataset, chart: BenchMap) -> float:
     """How far the recording itself differs at one pulse width: a map of pulse width alone cannot be nearer. [1]"""
     near, thrust = np.round(points.pulse_us), points.thrust_N
     if chart.with_voltage:
-        thrust = thrust / (points.voltage_V / chart.voltage_ref) ** chart.curves["thrust"].exponent
+        thrust = thrust / (points.voltage_V / chart.voltage_ref) ** chart.thrust.exponent
     spans = [float(np.ptp(thrust[near == u])) for u in np.unique(near) if np.count_nonzero(near == u) > 1]
     return max(spans) / float(np.max(thrust)) if spans else float("nan")
 

@@ -438,11 +438,9 @@ def write(found: DriveResult, out: str | Path) -> None:
     outputs.check("--out", folder, RESULTS, found.case.files())
     write_atomic(folder / RESULTS[0], json_text(found.to_dict()))
     write_atomic(folder / RESULTS[1], csv_text(list(rows[0]), rows))
-    panels: list[dict[str, Any]] = [
-        {"x": "pulse width [µs]", "y": "thrust [N]", "series": [("", steady.pulse_us, steady.thrust_N, "-")]},
-        {"x": "pulse width [µs]", "y": "battery current [A]", "series": [("", steady.pulse_us, steady.battery_A, "-")]},
-    ]
+    loads = (("thrust [N]", steady.thrust_N), ("battery current [A]", steady.battery_A))
+    panels = [outputs.Panel("pulse width [µs]", y, [("", steady.pulse_us, v, "-")]) for y, v in loads]
     if found.course is not None:
         series = [("", found.course.time_s, found.course.thrust_N, "-")]
-        panels.append({"x": "time [s]", "y": "thrust [N]", "series": series})
+        panels.append(outputs.Panel("time [s]", "thrust [N]", series))
     write_atomic(folder / RESULTS[2], outputs.curves(panels, found.case.name))

@@ -70,7 +70,7 @@ def tables(chart: BenchMap, nodes: int = 41) -> tuple[dict[str, Array], dict[str
     forward |= {COLUMNS[name]: chart.at(name, pulse) for name in COLUMNS if name in chart.curves}
     if chart.voltage is not None:
         forward["recorded_voltage_V"] = chart.voltage_at(pulse)
-    low = max(float(chart.curves["thrust"].values[0]), 0.0)
+    low = max(float(chart.thrust.values[0]), 0.0)
     wanted = np.linspace(low, chart.full_thrust_N, nodes)
     return forward, {"thrust_N": wanted, "pulse_us": chart.pulse_for(wanted)}
 
@@ -97,7 +97,7 @@ def c_header(chart: BenchMap, name: str = "drive", nodes: int = 41) -> str:
     forward, inverse = tables(chart, nodes)
     lo, hi = chart.pulse_range_us
     t0, t1 = float(inverse["thrust_N"][0]), float(inverse["thrust_N"][-1])
-    m = chart.curves["thrust"].exponent
+    m = chart.thrust.exponent
     parts = [
         f"/* Bench map of {p}: pulse width [us], thrust [N]; written by bemt. Equal steps, linear between them. */",
         *[f"/* {note.replace('*/', '')} */" for note in chart.notes],
@@ -259,7 +259,7 @@ def text(result: MapResult) -> str:
         words = f"{100 * worst:.2f} %, rms {100 * rms:.2f} %: scatter of the readings"
         lines.append(f"with known speed the thrust error would still be {words}")
     if chart.with_voltage:
-        m = chart.curves["thrust"].exponent
+        m = chart.thrust.exponent
         low, high = chart.voltage_range
         law = f"thrust scales with (V / {chart.voltage_ref:.2f} V)^{m:.2f}"
         lines.append(f"{law}, recorded from {low:.2f} to {high:.2f} V")

@@ -326,7 +326,6 @@ def _fit(m: Measured, errors: Sequence[tuple[str, float | None]]) -> ErrorSource
     names = [name for name, _ in errors]
     fixed = {name.split(" ")[0]: f for name, f in errors if f is not None}
     free = [name for name, f in errors if f is None]
-    factor = {method: fixed.get(f"{method}.factor", 1.0) for method in METHODS}
     y, blocks = _data(m)
     slopes = [v for v in (m.data_sheet, m.back_emf and m.back_emf.slope, m.torque and m.torque.slope) if v]
     ke = float(np.median(slopes))
@@ -334,14 +333,13 @@ def _fit(m: Measured, errors: Sequence[tuple[str, float | None]]) -> ErrorSource
 
     def model(ke: float, size: dict[str, float]) -> Array:
         out: list[float] = []
-        if m.data_sheet is not None:
-            out.append(factor["data_sheet"] * ke * size.get("data_sheet.gain", 1.0))
-        if m.back_emf is not None:
-            out += [factor["back_emf"] * ke * size.get("back_emf.gain", 1.0), size.get("back_emf.offset", 0.0)]
-        if m.torque is not None:
-            s = size.get("torque.shunt", 1.0)
-            gain = factor["torque"] * size.get("torque.gain", 1.0)
-            out += [gain * ke * s, (s - 1.0) * m.live_zero_Nm + size.get("torque.offset", 0.0)]
+        for method, read in zip(METHODS, (m.data_sheet, m.back_emf, m.torque), strict=True):
+            if read is None:
+                continue
+            s, zero = size.get(f"{method}.shunt", 1.0), m.live_zero_Nm if method == "torque" else 0.0
+            out.append(fixed.get(f"{method}.factor", 1.0) * size.get(f"{method}.gain", 1.0) * ke * s)
+            if method != "data_sheet":
+                out.append((s - 1.0) * zero + size.get(f"{method}.offset", 0.0))
         return np.array(out)
 
     cov = _covariance(m, blocks)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -77,16 +78,26 @@ def box_plot(values: Mapping[str, Array], marks: Mapping[str, float], ylabel: st
     return _png(figure, title)
 
 
-def curves(panels: Sequence[Mapping[str, Any]], title: str = "") -> bytes:
+@dataclass(frozen=True)
+class Panel:
+    """Lines of one frame: label, x, y and style of each."""
+
+    x: str
+    y: str
+    series: Sequence[tuple[str, Any, Any, str]]
+    title: str = ""
+
+
+def curves(panels: Sequence[Panel], title: str = "") -> bytes:
     """Draw panels of lines and points."""
     figure, axes = _figure(len(panels), 5.0, 3.9)
     for ax, panel in zip(axes, panels, strict=True):
-        for k, (label, x, y, style) in enumerate(panel["series"]):
+        for k, (label, x, y, style) in enumerate(panel.series):
             ax.plot(x, y, style, color=canvas.CYCLE[k % len(canvas.CYCLE)], ms=4, mfc="none", label=label)
-        ax.set_xlabel(panel["x"])
-        ax.set_ylabel(panel["y"])
-        ax.set_title(panel.get("title", ""), fontsize=10)
-        if any(label for label, *_ in panel["series"]):
+        ax.set_xlabel(panel.x)
+        ax.set_ylabel(panel.y)
+        ax.set_title(panel.title, fontsize=10)
+        if any(label for label, *_ in panel.series):
             ax.legend(frameon=False, fontsize=8)
     return _png(figure, title)
 

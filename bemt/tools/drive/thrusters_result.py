@@ -289,9 +289,9 @@ def _picture(name: str, most: float, force: float, distance: Any, corners: Any, 
     if force > 0.0:
         series.append((f"pair that gives {force:g} N", distance, moment_at(distance, most, force), "--"))
     return outputs.curves([
-        {"x": "mounting distance [m]", "y": "roll moment [N m]", "series": series},
-        {"x": "force [N]", "y": "roll moment [N m]", "series": [
+        outputs.Panel("mounting distance [m]", "roll moment [N m]", series),
+        outputs.Panel("force [N]", "roll moment [N m]", [
             ("attainable", corners[:, 0], corners[:, 1], "-"),
             ("wanted", [got.wanted_force_N], [got.wanted_moment_Nm], "x"),
-            ("given", [got.force_N], [got.moment_Nm], "o")]},
+            ("given", [got.force_N], [got.moment_Nm], "o")]),
     ], name)  # fmt: skip

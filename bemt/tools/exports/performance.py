@@ -318,7 +318,7 @@ def band_of(case: Case, rpm: float, airspeed_m_s: tuple[float, float]) -> Stated
 
     made = propagate(case, rpm, airspeed_m_s)
     found = made.points
-    _refuse(case, found, np.isfinite(found.u["thrust_N"]) & np.isfinite(found.u["torque_Nm"]))
+    _refuse(case, found, np.isfinite(found.u_thrust_N) & np.isfinite(found.u_torque_Nm))
     (T0, T1), (Q0, Q1) = ((float(v[0]), float(v[1])) for v in (found.thrust_N, found.torque_Nm))
     with np.errstate(divide="ignore"):
         u = [found.u[name] / np.abs(found[name]) for name in ("thrust_N", "torque_Nm")]

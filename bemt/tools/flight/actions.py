@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -59,7 +59,7 @@ class FlightsAnswer(Answered):
         """Three lines for the pilot and what each flight shows; a table for a folder."""
         if not self.folder:
             return self._texts(False)
-        parts = [_aligned(self.table()), *(f"{f.file}: {f.got}" for f in self.faults)]
+        parts = [_aligned([_row(a) for a in self.flights]), *(f"{f.file}: {f.got}" for f in self.faults)]
         return "\n".join(p for p in parts if p)
 
     @property
@@ -88,7 +88,7 @@ class FlightsAnswer(Answered):
 
     def table(self) -> list[dict[str, Any]]:
         """One row a flight: file, format, rotors, seconds in the air, verdict, where to look, constants."""
-        return [_row(a) for a in self.flights]
+        return [asdict(_row(a)) for a in self.flights]
 
     def csv(self) -> str:
         """The table as CSV."""
@@ -317,7 +317,7 @@ def _with_model(answer: FlightAnswer, case: str) -> FlightAnswer:
 
     rpm, rotor, flow = sum(speeds) / len(speeds), rotor_of(case), answer.inflow
     points = rotor.solve(rpm=rpm, airspeed_m_s=0.0)
-    hover, u = float(points.thrust_N[0]), float(points.u["thrust_N"][0])
+    hover, u = float(points.thrust_N[0]), float(points.u_thrust_N[0])
     flown = answer.found.constants.get("thrust constant")
     if flown is not None and flown.unit == "N/rpm^2" and not 1.0 / _FAR < flown.value * rpm**2 / hover < _FAR:
         got = f"{flown.value * rpm**2:.3g} N of each rotor at {rpm:.0f} rev/min"
@@ -332,8 +332,30 @@ def _with_model(answer: FlightAnswer, case: str) -> FlightAnswer:
     return replace(answer, predicted=found)
 
 
-def _row(a: FlightAnswer) -> dict[str, Any]:
+@dataclass(frozen=True)
+class _Row:
     """One flight in the table; None where the log does not show it."""
+
+    file: str
+    format: str
+    rotors: int | None
+    flying_s: float | None
+    verdict: str
+    effects: str
+    look: str
+    thrust_constant: float | None
+    thrust_constant_half: float | None
+    thrust_constant_unit: str | None
+    thrust_over: str | None
+    mass_kg: float | None
+    mass_half_kg: float | None
+    hover_command: float | None
+    sensors: str
+    vibration_m_s2: float | None
+    wind_m_s: float | None
+
+
+def _row(a: FlightAnswer) -> _Row:
     import numpy as np
 
     from bemt.tools.flight.text import pilot, sensor_text
@@ -345,35 +367,29 @@ def _row(a: FlightAnswer) -> dict[str, Any]:
     def rounded(value: float) -> float | None:
         return float(f"{value:.4g}") if np.isfinite(value) else None
 
-    return {
-        "file": a.log.file, "format": a.log.format, "rotors": a.log.rotors or a.log.stated_rotors or None,
-        "flying_s": rounded(float(a.log.flying.mean() * np.ptp(a.log.t))), "verdict": a.judged.said.verdict,
-        "effects": "; ".join(a.judged.said.effects), "look": pilot(a)[0],
-        "thrust_constant": None if k is None else rounded(k.value),
-        "thrust_constant_half": None if k is None else rounded(k.half),
-        "thrust_constant_unit": None if k is None else k.unit,
-        "thrust_over": None if k is None else "speed^2" if "thrust constant" in a.found.constants else "command",
-        "mass_kg": None if a.mass is None else rounded(a.mass.value),
-        "mass_half_kg": None if a.mass is None else rounded(a.mass.half),
-        "hover_command": None if hover is None else rounded(hover.value),
-        "sensors": "; ".join(sensor_text(s) for s in a.log.sensors), "vibration_m_s2": rounded(level),
-        "wind_m_s": rounded(a.wind.speed),
-    }  # fmt: skip
+    over = "speed^2" if "thrust constant" in a.found.constants else "command"
+    return _Row(
+        a.log.file, a.log.format, a.log.rotors or a.log.stated_rotors or None,
+        rounded(float(a.log.flying.mean() * np.ptp(a.log.t))), a.judged.said.verdict, "; ".join(a.judged.said.effects),
+        pilot(a)[0], None if k is None else rounded(k.value), None if k is None else rounded(k.half),
+        None if k is None else k.unit, None if k is None else over,
+        None if a.mass is None else rounded(a.mass.value), None if a.mass is None else rounded(a.mass.half),
+        None if hover is None else rounded(hover.value), "; ".join(sensor_text(s) for s in a.log.sensors),
+        rounded(level), rounded(a.wind.speed),
+    )  # fmt: skip
 
 
-def _aligned(rows: Sequence[dict[str, Any]]) -> str:
+def _aligned(rows: Sequence[_Row]) -> str:
     """The columns that a screen holds."""
     from bemt.base.tables import text_table
 
     cells = []
     for r in rows:
-        k = r["thrust_constant"]
-        half = "" if k is None else f"{100 * r['thrust_constant_half'] / k:.1f} %"
-        constant = "" if k is None else f"{k:.4g} ± {half} {r['thrust_constant_unit']}"
-        constant = constant and f"{r['thrust_over']}: {constant}"
-        what = f"{r['verdict']}: {r['effects']}" if r["effects"] else r["verdict"]
-        sensor = "" if not r["sensors"] else r["sensors"].removeprefix("The speed sensor of ")
-        seconds = f"{r['flying_s'] or 0.0:.0f} s"
-        cells.append((Path(r["file"]).name, str(r["rotors"] or ""), seconds, what, constant, sensor))
+        k, half = r.thrust_constant, r.thrust_constant_half
+        share = "" if k is None or half is None else f"{100 * half / k:.1f} %"
+        constant = "" if k is None else f"{r.thrust_over}: {k:.4g} ± {share} {r.thrust_constant_unit}"
+        what = f"{r.verdict}: {r.effects}" if r.effects else r.verdict
+        sensor = r.sensors.removeprefix("The speed sensor of ")
+        cells.append((Path(r.file).name, str(r.rotors or ""), f"{r.flying_s or 0.0:.0f} s", what, constant, sensor))
     heads = ("file", "rotors", "in the air", "verdict", "thrust over", "sensor")
     return text_table(heads, cells, range(len(heads)))

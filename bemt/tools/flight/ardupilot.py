@@ -289,16 +289,16 @@ def _bursts(found: Mapping[str, Mapping[str, NDArray[Any]]]) -> Source | None:
     if any(k not in heads for k in _WANTED["ISBH"]) or any(k not in blocks for k in _WANTED["ISBD"]):
         return None
     times, values = [], []
-    for k in np.flatnonzero((heads["type"] == 0) & (heads["instance"] == 0)):
-        mul, rate = float(heads["mul"][k]), float(heads["smp_rate"][k])
-        rows = np.flatnonzero(blocks["N"] == heads["N"][k])
-        if not mul > 0.0 or not rate > 0.0 or not rows.size:
+    number, place, *axes = (blocks[k] for k in _WANTED["ISBD"])
+    for burst, kind, instance, mul, count, start, rate in zip(*(heads[k] for k in _WANTED["ISBH"]), strict=True):
+        rows = np.flatnonzero(number == burst)
+        if kind != 0 or instance != 0 or not mul > 0.0 or not rate > 0.0 or not rows.size:
             continue
-        rows = rows[np.argsort(blocks["seqno"][rows])]
-        xyz = np.stack([blocks[a][rows].reshape(-1).astype(float) for a in "xyz"], axis=1)[: int(heads["smp_cnt"][k])]
-        step = blocks["seqno"][rows][:, None] * 32 + np.arange(32)
-        times.append(1e-6 * float(heads["SampleUS"][k]) + step.reshape(-1)[: len(xyz)] / rate)
-        values.append(xyz / mul * _FLIP)
+        rows = rows[np.argsort(place[rows])]
+        xyz = np.stack([a[rows].reshape(-1).astype(float) for a in axes], axis=1)[: int(count)]
+        step = place[rows][:, None] * 32 + np.arange(32)
+        times.append(1e-6 * float(start) + step.reshape(-1)[: len(xyz)] / float(rate))
+        values.append(xyz / float(mul) * _FLIP)
     return (np.concatenate(times), np.concatenate(values)) if times else None
 
 

@@ -268,9 +268,9 @@ def _priors(ways: Mapping[str, Array], windy: bool, beside: BesideBalance) -> di
     singles |= {Explanation.of(_shaking(k)): LEFT_OUT for k in beside.shaken}
     singles |= {Explanation.of(_worn(k)): 1.0 for k in beside.shaken}
     total = sum(singles.values())
-    prior = {e: PRIOR["single"] * w / total for e, w in singles.items()}
+    prior = {e: PRIOR.single * w / total for e, w in singles.items()}
     both = [Explanation.of(i, j) for i, j in combinations(blades, 2)]
-    return prior | {e: PRIOR["pair"] / len(both) for e in both}
+    return prior | {e: PRIOR.pair / len(both) for e in both}
 
 
 def _weighed(
@@ -282,7 +282,7 @@ def _weighed(
     ``D`` are the readings per unit of each cause, in standard deviations; ``yaw`` marks the reading that wind spares.
     """
     chi2 = float(r.z @ r.z)
-    yield w.still, float(np.log(PRIOR["none"])) + r.density(chi2), None
+    yield w.still, float(np.log(PRIOR.none)) + r.density(chi2), None
     if not w.usual:
         return
     scale = np.sqrt(np.mean([v**2 for i, v in D.items() if i.startswith(BLADE)], axis=0) * LARGEST**2 / 3.0)
@@ -306,7 +306,7 @@ def _weighed(
         if not e.pair:
             yield w.still, log + size.log_small, None
     unlisted = r.density(float(np.sum(r.z**2 / (1.0 + scale**2))), float(free.sum()))
-    yield UNKNOWN, float(np.log(PRIOR["unknown"])) + unlisted, None
+    yield UNKNOWN, float(np.log(PRIOR.unknown)) + unlisted, None
 
 
 def _shaking(motor: int) -> str:

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from bemt.base.errors import needs
-from bemt.base.units import UNITS
+from bemt.base.units import KGF, RPM
 from bemt.judge.proof.live import Truth
 from bemt.tools.stand.sealed import bench_of
 
@@ -32,7 +32,7 @@ def _flightstand(truth: Truth) -> str:
     needs("FlightStand", "stand")
     grpc, fs, calls = (needs(m, "stand") for m in ("grpc", "flight_stand_api_v1_pb2", "flight_stand_api_v1_pb2_grpc"))
     kinds = {"thrust_N": (fs.FORCE_FZ, 1.0), "torque_Nm": (fs.TORQUE_MZ, 1.0),
-             "current_A": (fs.CURRENT_HALL_CURRENT, 1.0), "rpm": (fs.ROTATION_SPEED_FREQUENCY, UNITS["rpm"].factor),
+             "current_A": (fs.CURRENT_HALL_CURRENT, 1.0), "rpm": (fs.ROTATION_SPEED_FREQUENCY, RPM),
              "airspeed_m_s": (fs.AIRSPEED_DIFFERENTIAL_PRESSURE, 1.0),
              "vibration_m_s2": (fs.ACCELEROMETER_VIBRATION_LEVEL, 1.0)}  # fmt: skip
 
@@ -90,7 +90,7 @@ def _rcbenchmark(truth: Truth) -> str:
         other = free.getsockname()
     here = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     here.bind(("127.0.0.1", 0))
-    names = {"thrust_N": ("thrust", "kgf", 1.0 / UNITS["kgf"].factor), "torque_Nm": ("torque", "N·m", 1.0),
+    names = {"thrust_N": ("thrust", "kgf", 1.0 / KGF), "torque_Nm": ("torque", "N·m", 1.0),
              "current_A": ("current", "A", 1.0), "rpm": ("motorOpticalSpeed", "RPM", 1.0),
              "vibration_m_s2": ("vibration", "m/s²", 1.0), "airspeed_m_s": ("airspeed", "m/s", 1.0)}  # fmt: skip
 
