@@ -113,7 +113,7 @@ def _serial(truth: Truth) -> str:
     lines = os.fdopen(os.dup(ours), "r", errors="replace")
 
     def tell(r: Mapping[str, float]) -> None:
-        row = (1e3 * time.monotonic(), r["thrust_N"] / UNITS["gf"].factor, 1e3 * r["torque_Nm"], r["rpm"])
+        row = (1e3 * time.monotonic(), 1e3 * r["thrust_N"] / KGF, 1e3 * r["torque_Nm"], r["rpm"])
         os.write(ours, (",".join(f"{v:.7g}" for v in (*row, r["current_A"])) + "\n").encode())
 
     _talk(truth, lambda: lines.readline().removeprefix("S"), tell)
