@@ -224,7 +224,7 @@ class RotorEstimate(Dataset):
                                  "FM", "M_tip")  # fmt: skip
         empty = [key for key in ("J", "FM") if not np.nan_to_num(self.columns[key]).any()]  # all at rest, or in flight
         head, keys = [h for h in head if h not in empty], tuple(k for k in keys if k not in empty)
-        if self.angle_deg.any():
+        if self.columns["angle_deg"].any():
             head[2:2], keys = ["angle [deg]", "H [N]"], (*keys[:2], "angle_deg", "H_force_N", *keys[2:])
         shown = {key: [number_text(x, 2 if key.startswith("u") else 4) for x in self.columns[key]] for key in keys}
         shown["rpm"] = [speed_text(x) for x in self.rpm]
