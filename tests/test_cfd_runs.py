@@ -19,6 +19,7 @@ from bemt.base.errors import InputError
 from bemt.data.readers.cfd_run import RunToml, toml_text
 from bemt.data.recordings.cfd_run import assemble
 from bemt.data.recordings.cfd_setup import GRID_FLOOR, conditions_that_differ, grid_floor
+from bemt.data.recordings.load import import_files
 from bemt.judge.compare import one_run
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case.load import Assumption
@@ -261,6 +262,18 @@ def test_unit_sign_and_sector_are_applied_once(put: Callable[..., Path]) -> None
     assert own["thrust_N"][0] == pytest.approx(-3 * T * 4.4482216, rel=1e-4)
     assert own["torque_Nm"][0] == pytest.approx(-3 * Q, rel=1e-4)
     assert own.u["thrust_N"][0] == pytest.approx(3 * 4.4482216 * plain.u["thrust_N"][0], rel=1e-3)
+
+
+def test_files_that_we_fail_to_join_say_so(put: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each file can be read, so none of their own entries tells of it."""
+
+    def broken(*_: object) -> Dataset:
+        raise KeyError("thrust_N")
+
+    monkeypatch.setattr("bemt.data.recordings.cfd_run.assemble", broken)
+    found = import_files(fluent(put))
+    assert not found.runs and all(file.error is None for file in found.files)
+    assert found.to_do is not None and "KeyError" in found.to_do
 
 
 def test_a_column_is_named_by_its_unit(put: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:

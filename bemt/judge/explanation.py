@@ -10,11 +10,11 @@ from typing import Any
 from bemt.base.document import Documented
 from bemt.physics import effects
 
-__all__ = ["DOUBT", "NONE", "UNKNOWN", "Explanation", "Prior", "Size", "Sizes"]
+__all__ = ["DOUBT", "NONE", "UNKNOWN", "Explanation", "KindPrior", "Size", "Sizes"]
 
 
 @dataclass(frozen=True)
-class Prior:
+class KindPrior:
     """Probability of the kinds of explanation; they add up to one. [1]"""
 
     none: float

@@ -104,7 +104,8 @@ def columns_of(file: str, record: Dataset, several: bool) -> list[LoadColumn]:
     """Columns of one file that may be loads or say something of them."""
     form = record.format
     home = zone_of(Path(file), form) if several else ""
-    clock = {clocks_of(record)[0], *clocks_of(record)[1]}
+    time, every = clocks_of(record)
+    clock = {time, *every}
     out = []
     for name in record.values:
         if name in clock or _ASIDE.match(name) or (form == "flow360_forces" and re.match(r"Disk\d+_Blade", name)):

@@ -291,8 +291,9 @@ def runs_of(
     except Exception as error:
         if insist:
             raise
-        if not isinstance(error, InputError):  # the file's own entry says it
-            return runs, None
+        if not isinstance(error, InputError):
+            # what a file refuses to hold its own entry says; where we fail to join files, nothing else does
+            return runs, None if isinstance(error, (ValueError, OSError)) else _refusal(error)
         fields = {importers.detect(e) for e in exports} <= FIELDS  # values at points are no run
         return runs, None if fields and any(f.expected == cfd_run.NO_LOAD for f in error.faults) else str(error)
 

@@ -20,11 +20,11 @@ from bemt.base.gaussian.whitening import log_density, whitener
 from bemt.judge.compare import smooth_change as fits
 from bemt.judge.compare.matched import FOLLOWS_LOAD, POWER_OF_SPEED, MatchedChannel
 from bemt.judge.compare.smooth_change import Scatter
-from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation, Prior, Sizes
+from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation, KindPrior, Sizes
 from bemt.judge.loss import Decision, decide
 from bemt.physics.effects.base import FORM
 
-PRIOR = Prior(none=0.7, single=0.2, pair=0.05, unknown=0.05)
+PRIOR = KindPrior(none=0.7, single=0.2, pair=0.05, unknown=0.05)
 """Prior probability of the kinds of explanation of a drive, which is judged beside the loads: a cause is half as likely
 as there (declared) [1]."""
 _PRIOR = {NONE: PRIOR.none, UNKNOWN: PRIOR.unknown}

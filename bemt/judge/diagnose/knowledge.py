@@ -24,7 +24,7 @@ from bemt.judge.compare.matched import StandRun, stand_run
 from bemt.judge.compare.recordings import RunChange, changed
 from bemt.judge.diagnose import other_rotor, record
 from bemt.judge.diagnose.record import merged
-from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation, Prior
+from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation, KindPrior
 from bemt.physics import effects
 from bemt.physics.dataset import Dataset
 from bemt.physics.effects.air_density import AirDensity
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from bemt.judge.diagnose.signatures import Candidate
     from bemt.judge.loss import Decision
 
-PRIOR = Prior(none=0.4, single=0.45, pair=0.1, unknown=0.05)
+PRIOR = KindPrior(none=0.4, single=0.45, pair=0.1, unknown=0.05)
 """Prior probability of the kinds of explanation; shared within a kind by the weights of the effects. [1]"""
 LEFT_OUT, PRESENT = 10.0, 0.01
 """Weight of an effect of every real rotor that the baseline leaves out, and of one that the baseline has, with other
@@ -100,13 +100,13 @@ def present(problem: Problem) -> set[str]:
     return set.intersection(*({e.id for e in p.baseline} | d for p, d in zip(problem.parts, ducts, strict=True)))
 
 
-def kinds(problem: Problem) -> Prior:
+def kinds(problem: Problem) -> KindPrior:
     """Prior of the kinds of explanation: a drive shows in the speed alone."""
     return drive_laws.PRIOR if np.all(problem.channel == record.CHANNELS.index("rpm")) else PRIOR
 
 
 def log_priors(
-    weights: dict[str, float], pairs: bool = True, of: Prior = PRIOR,
+    weights: dict[str, float], pairs: bool = True, of: KindPrior = PRIOR,
     alone: Mapping[Explanation, float] | None = None,
 ) -> dict[Explanation, float]:  # fmt: skip
     """Logarithm of the prior probability of every explanation, of effects and of what stands ``alone``, in no pair.

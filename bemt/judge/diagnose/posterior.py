@@ -137,7 +137,8 @@ def weigh(
 ) -> Evidence:  # fmt: skip
     """Weigh all explanations but those that are ``gone``, ruled out; candidates are without them."""
     bank = _Bank.of(problem, candidates)
-    rivals = noise.rivals(problem, _told(candidates))
+    # whatever its law, what changes along a variable of its own is that effect
+    rivals = noise.rivals(problem, [v for v, i in _own_variables().items() if i in bank.spans])
     other = Another.of(problem)
     if other is not None and other[0].ids & set(gone):
         other = None
@@ -216,11 +217,13 @@ def _noticed(
     return np.array(out)
 
 
-def _told(candidates: Sequence[Candidate]) -> list[str]:
-    """Variables that one effect alone follows: what changes along a wall's distance is the wall, whatever its law."""
-    along = [(v, e.id) for e in effects.catalogue().values() for v in e.along]
-    tried = {c.id for c in candidates}
-    return [v for v, i in along if i in tried and [w for w, _ in along].count(v) == 1]
+def _own_variables() -> dict[str, str]:
+    """Variables that one effect alone follows, and which: what changes along a wall's distance is the wall."""
+    followed: dict[str, list[str]] = {}
+    for e in effects.catalogue().values():
+        for v in e.along:
+            followed.setdefault(v, []).append(e.id)
+    return {v: ids[0] for v, ids in followed.items() if len(ids) == 1}
 
 
 def _stated(problem: Problem, candidates: Sequence[Candidate]) -> set[str]:
@@ -228,11 +231,9 @@ def _stated(problem: Problem, candidates: Sequence[Candidate]) -> set[str]:
 
     A recorded wall is not left out. Where the readings ask for more of it, its published law is off.
     """
-    on = frozenset[str].intersection(*(frozenset(e.id for e in p.baseline) for p in problem.parts))
-    varied = {v for v in _told(candidates) if v in problem.covariates and np.ptp(problem.covariates[v]) > 0.0}
-    catalogue = effects.catalogue()
-    laws = {c.id: catalogue[c.id].law or c.id for c in candidates}
-    return {i for i, law in laws.items() if law in on and varied & set(catalogue[law].along)}
+    known, X = knowledge.present(problem), problem.covariates
+    varied = {i for v, i in _own_variables().items() if i in known and v in X and np.ptp(X[v]) > 0.0}
+    return {c.id for c in candidates if (effects.catalogue()[c.id].law or c.id) in varied}
 
 
 def _leading(bank: _Bank) -> list[Hyper]:
