@@ -369,13 +369,17 @@ def _row(a: FlightAnswer) -> _Row:
 
     over = "speed^2" if "thrust constant" in a.found.constants else "command"
     return _Row(
-        a.log.file, a.log.format, a.log.rotors or a.log.stated_rotors or None,
-        rounded(float(a.log.flying.mean() * np.ptp(a.log.t))), a.judged.said.verdict, "; ".join(a.judged.said.effects),
-        pilot(a)[0], None if k is None else rounded(k.value), None if k is None else rounded(k.half),
-        None if k is None else k.unit, None if k is None else over,
-        None if a.mass is None else rounded(a.mass.value), None if a.mass is None else rounded(a.mass.half),
-        None if hover is None else rounded(hover.value), "; ".join(sensor_text(s) for s in a.log.sensors),
-        rounded(level), rounded(a.wind.speed),
+        file=a.log.file, format=a.log.format, rotors=a.log.rotors or a.log.stated_rotors or None,
+        flying_s=rounded(float(a.log.flying.mean() * np.ptp(a.log.t))),
+        verdict=a.judged.said.verdict, effects="; ".join(a.judged.said.effects), look=pilot(a)[0],
+        thrust_constant=None if k is None else rounded(k.value),
+        thrust_constant_half=None if k is None else rounded(k.half),
+        thrust_constant_unit=None if k is None else k.unit, thrust_over=None if k is None else over,
+        mass_kg=None if a.mass is None else rounded(a.mass.value),
+        mass_half_kg=None if a.mass is None else rounded(a.mass.half),
+        hover_command=None if hover is None else rounded(hover.value),
+        sensors="; ".join(sensor_text(s) for s in a.log.sensors),
+        vibration_m_s2=rounded(level), wind_m_s=rounded(a.wind.speed),
     )  # fmt: skip
 
 
