@@ -107,9 +107,11 @@ def _diagnose(
     candidates = tuple(c for c in knowledge.possible(problem, candidates) if c.id not in given.ruled_out)
     absent |= dict.fromkeys(given.ruled_out, "ruled out by a check")
     problem, candidates = ask_reference(problem, candidates)
+    change = ratios(absent.keys()) if any(p.record.reference for p in problem.parts) else None
+    if change is not None:
+        candidates = tuple(by_laws.as_counted(c, change) for c in candidates)
     say("weighing explanations")
     found = posterior.weigh(problem, candidates, gone=gone)
-    change = ratios(absent.keys()) if any(p.record.reference for p in problem.parts) else None
     found = replace(found, probability=knowledge.combined(found, change))
     P = _of_motor(found)
     decision = _decided(P, found.probability)

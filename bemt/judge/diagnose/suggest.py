@@ -382,7 +382,7 @@ def suggest(found: Evidence, rivals: Sequence[Rival], unknown: float = 0.0, refe
     able = [c for c in choices if c.gain * total >= _WORTH and (c.kind == "reference" or c.after >= _ENOUGH)]
     able.sort(key=lambda c: -c.gain / c.minutes)
     certain = before >= _ENOUGH and not reference
-    looked = look(names, part.record)
+    looked = look(names if total >= _WORTH else names[:1], part.record)  # without doubt there is no rival to rule out
     worth = [c for c in choices if c.kind == "run" and c.gain * total >= _WORTH]
     # where no run is able to, one that tells only the others apart is better than nothing
     instead = looked or max(worth, key=lambda c: c.gain / c.minutes, default=None)
