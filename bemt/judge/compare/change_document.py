@@ -34,6 +34,7 @@ from bemt.judge.loss import SPREAD, checks_by_worth, minutes
 from bemt.physics.effects import catalogue
 
 AIR_OF_BOTH = "--air-a TEMPERATURE,PRESSURE --air-b TEMPERATURE,PRESSURE"
+ONE_SETUP = "compute both with one set-up: before that no physics is named"
 DAYS = (
     "note temperature and pressure of both days, with units as in 20C,1013hPa; density is the first thing that differs "
     "between days"
@@ -59,11 +60,15 @@ def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
     checks = {k: check for k in said.effects if (check := _check(k))}
     loads = [r for r in change.ratios.values() if r.kind in LOADS]
     apart = max((abs(math.log(r.ratio)) for r in loads), default=0.0)
-    days = math.isnan(change.density_ratio) and apart < _DAY
+    days = math.isnan(change.density_ratio) and apart < _DAY and not (change.a.setup and change.b.setup)
+    if change.other_setup and said.verdict in ("none", "insufficient"):
+        return {"text": ONE_SETUP, "command": ""}
     if said.verdict == "none" and days and apart > _SEEN:
         return {"text": DAYS, "command": asked.with_days()}
     if said.verdict == "none":
         text = "to see smaller changes, remove the propeller, mount it again and repeat each run once"
+        if change.a.setup and change.b.setup:
+            text = "to see smaller changes, compute both on a finer grid"
         return {"text": text, "command": ""}
     if said.why.startswith(_TOLD):
         return {"text": "", "command": ""}

@@ -14,6 +14,7 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
+from bemt.data.recordings import cfd_setup
 from bemt.judge.compare import smooth_change as fits
 from bemt.judge.compare.drive_laws import (
     SUPPLY,
@@ -196,6 +197,11 @@ class RunChange:
         return min(loads, default=0.0) >= math.log(_FAR_OFF)
 
     @property
+    def other_setup(self) -> str:
+        """How B was computed otherwise than A, in words; "" where nothing says so."""
+        return cfd_setup.other_setup(self.a.setup, self.b.setup)
+
+    @property
     def wind(self) -> str:
         """Why the runs cannot be compared where one windmills, the other does not, and nobody says in what wind."""
         runs = (("A", self.a), ("B", self.b))
@@ -208,7 +214,8 @@ class RunChange:
     @property
     def no_pair(self) -> str:
         """Why the runs cannot be compared; "" where they can."""
-        return self.wind or (NOTHING_SHARED if self.apart else OTHER_STAND if self.far_off else "")
+        other = f"computed otherwise: {self.other_setup}" if self.other_setup else ""
+        return self.wind or (NOTHING_SHARED if self.apart else OTHER_STAND if self.far_off else other)
 
     @property
     def by_density(self) -> str:
@@ -317,7 +324,9 @@ def _assumed(a: StandRun, b: StandRun, diameter: float, loads: Mapping[str, Matc
 
 
 def _notes(a: StandRun, b: StandRun, channels: Mapping[str, MatchedChannel], strays: Mapping[str, int]) -> list[str]:
-    out = [_misread(letter, run) for letter, run in (("A", a), ("B", b)) if run.misread[0]]
+    other = cfd_setup.other_setup(a.setup, b.setup)
+    out = [f"computed otherwise: {other}"] if other else []
+    out += [_misread(letter, run) for letter, run in (("A", a), ("B", b)) if run.misread[0]]
     out += [note for c in channels.values() for note in c.notes]
     out += [
         f"{n} reading{'s' if n > 1 else ''} of {channels[k].channel} far from all others dropped"

@@ -100,6 +100,8 @@ def _factored(found: posterior.Evidence, pair: RunChange) -> dict[Explanation, f
     A ratio of pole pairs moves the speeds apart itself, a unit the loads.
     """
     P = found.probability
+    if pair.other_setup:
+        P = knowledge.shared_with_files(P, {k for k in P if k.ids or k == UNKNOWN})
     if pair.by_proxy:  # the losses of a motor are something smooth that is no cause
         P = {**P, UNKNOWN: 0.0, DOUBT: P[UNKNOWN]}
     if pair.turned:  # nothing but the cell or the sense of rotation turns thrust round
@@ -130,8 +132,8 @@ def weighed(
     names = [i for i in law_effects() if (only is None or i in only) and i not in gone]
     candidates, _ = signatures.candidates(problem, names)
     # what two thermometers leave open of the density counts as repeatability
-    known = density_change(pair.a, pair.b)[1]
-    candidates = tuple(as_counted(c, pair) for c in candidates if not (known and c.id == "air_density"))
+    thermometers = density_change(pair.a, pair.b)[1]
+    candidates = tuple(as_counted(c, pair) for c in candidates if not (thermometers and c.id == "air_density"))
     return posterior.weigh(problem, knowledge.possible(problem, candidates))
 
 
@@ -237,6 +239,7 @@ def _record(
         reference=reference, repeatability=repeatability,
         electrical=channels.get("torque_Nm") == "electrical_power_W",
         unitless=frozenset(k for k, c in channels.items() if c in ("CT", "CP", "CQ")),
+        computed=points.kind == "cfd" or bool(run.setup), setup=run.setup,
     )  # fmt: skip
     return record.take(np.flatnonzero(good))
 

@@ -14,6 +14,7 @@ from bemt.base.arrays import Array
 from bemt.base.gaussian.evidence import shares
 from bemt.base.gaussian.whitening import whitener
 from bemt.judge import loss
+from bemt.judge.compare.change_document import ONE_SETUP
 from bemt.judge.diagnose import by_laws, form, knowledge, noise, other_rotor, posterior, signatures
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import suggest as suggestion
@@ -245,6 +246,8 @@ def _settling(found: posterior.Evidence, decision: loss.Decision, best: fitting.
     if decision.verdict == "none":
         faint = rivals_of(["", *singles][:_MOST_RIVALS])
         return suggestion.nothing_called_for(found, faint, found.probability[UNKNOWN])
+    if decision.by == "files" and found.problem.setups_that_differ:
+        return suggestion.Suggestion(ONE_SETUP, (), (), 0.0, 0.0, "cfd")
     if decision.verdict == "insufficient" and (mend := other_rotor.to_mend(found.problem)):
         return suggestion.mended(found, mend)
     if other_rotor.doubted(found.problem, decision):

@@ -254,7 +254,8 @@ def _at_other_advance(problem: Problem, size: float) -> Array:
 
 def doubted(problem: Problem, said: Decision) -> bool:
     """Whether it is the rotor of the case that is in doubt, and not a file."""
-    return said.by == "files" and not contradiction(problem)[0] and not unrepeatable(problem)
+    elsewhere = contradiction(problem)[0] or unrepeatable(problem) or problem.setups_that_differ
+    return said.by == "files" and not elsewhere
 
 
 def nearest_rotors(problem: Problem) -> str:
