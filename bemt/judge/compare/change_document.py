@@ -324,8 +324,8 @@ def _at(word: str, r: Ratio) -> str:
 
 def _open(doc: ComparedRuns, size: str) -> str:
     """Why nothing is said, and what is likeliest."""
-    if doc.rule == NO_SPEED:
-        return f"Something changed{size}; {NO_SPEED}."
+    if doc.rule.endswith(NO_SPEED):
+        return f"Something changed: {doc.rule}."
     if doc.rule.endswith((IN_WIND, NOTHING_SHARED)):
         return f"These recordings cannot be compared: {doc.rule}."
     if doc.rule.startswith(SPREAD):
@@ -427,7 +427,7 @@ def sentence(doc: ComparedRuns) -> str:
     if doc.verdict == "unknown":
         return f"Unknown: {doc.rule}."
     first = [title_of(k) for k in _likely(doc)]
-    if doc.rule == OTHER_STAND or doc.rule.endswith((IN_WIND, NOTHING_SHARED)):
+    if doc.rule == OTHER_STAND or doc.rule.endswith((IN_WIND, NOTHING_SHARED, NO_SPEED)):
         return f"No cause can be given: {doc.rule}."
     if doc.rule.startswith(SPREAD):
         return f"No change is proven: {doc.rule}" + (f"; else {', '.join(first)}" if first else "") + "."

@@ -30,6 +30,7 @@ from bemt.judge.compare.matched import (
     DRIVE,
     LOADS,
     POWER_OF_SPEED,
+    SESSION,
     WITHOUT_SPEED,
     MatchedChannel,
     StandRun,
@@ -88,10 +89,26 @@ class RunChange:
         """Verdict on what acts on the rotor, worked out when it is asked for."""
         if not self.without_speed:
             return self.judge(self) if self.loads_by_name else NO_VERDICT
-        ((name, c),) = self.rotor.channels.items()
-        P = weigh_factor(c, self.rotor.likelier[name])
+        # a cut blade takes less power, and gives as much thrust for it: at one command both are less
+        P = min((weigh_factor(c, scatter) for c, scatter in self._bare), key=lambda P: P[NONE])
         said = decide(P)
-        return Judgement.of(replace(said, why=NO_SPEED) if said.by == "files" else said, P)
+        return Judgement.of(replace(said, why=self.no_speed) if said.by == "files" else said, P)
+
+    @property
+    def _bare(self) -> list[tuple[MatchedChannel, fits.Scatter]]:
+        """Thrust at what stands for the speed, with its scatter: at equal power, at equal command and known voltage."""
+        runs, volts = [self.rotor], [r.points.values.get("voltage_V") for r in (self.a, self.b)]
+        V = [float(np.nanmean(v)) for v in volts if v is not None]
+        if "at_power" in self.rotor.channels and len(V) == 2 and abs(V[1] / V[0] - 1.0) < SESSION["voltage"]:
+            runs.append(fits.prepared(self.a, self.b, ("at_command",), self.diameter_m))
+        return [(c, run.likelier[name]) for run in runs for name, c in run.channels.items()]
+
+    @property
+    def no_speed(self) -> str:
+        """Why thrust that changed has no cause without a speed, with its change at each."""
+        found = [fits.ratio_of(c, scatter) for c, scatter in self._bare]
+        told = {f"{r.ratio - 1.0:+.1%} at equal {WITHOUT_SPEED[r.kind]}": None for r in found}
+        return f"thrust {', '.join(told)}; {NO_SPEED}"
 
     @cached_property
     def drive(self) -> Judgement:
