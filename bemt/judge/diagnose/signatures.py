@@ -242,12 +242,12 @@ def _grid(
             share = float(np.prod([p.density(x) for p, x in zip(axes, v, strict=True)]))
             yield {**form, **dict(zip(names, map(float, v), strict=True))}, flat[:, k], True, share
         return
+    count = _FINE.get(len(axes), 5)
     # a parameter that moves no reading is not at work: a spline would make differences of its rounding
     still = [k for k in range(len(axes)) if np.all(np.ptp(table, axis=k + 1).T <= _ROUNDING * problem.u)]
     table = table[tuple([slice(None), *(0 if k in still else slice(None) for k in range(len(axes)))])]
     axes, nodes = ([v for k, v in enumerate(some) if k not in still] for some in (axes, nodes))
     names = [p.name for p in axes]
-    count = _FINE.get(len(axes), 5)
     fine = [_spread(p, n, count) if n.size > 2 else n for p, n in zip(axes, nodes, strict=True)]
     shares = [np.array([p.density(x) for x in f]) * (1.0 if p.usual is None else np.gradient(f))
               for p, f in zip(axes, fine, strict=True)]  # fmt: skip
