@@ -118,6 +118,13 @@ def constant(facts: Facts) -> Iterator[Finding]:
             yield Finding("constant_column", own, text, fix, (), severity)
 
 
+@check_for("unnamed")
+def unnamed(facts: Facts) -> Iterator[Finding]:
+    """A column that may be the airspeed, or the state of the air, and has no heading that says so."""
+    for name, text, fix in facts.asked.values():
+        yield Finding("unnamed_column", name, text, fix, (), "warning")
+
+
 @check_for("misread")
 def misread(facts: Facts) -> Iterator[Finding]:
     """A single load of a table of points at rest that lies far off the curve of the others."""

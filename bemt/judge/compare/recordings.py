@@ -42,7 +42,7 @@ REVERSED = "thrust has the other sign in B, and its size is the same"
 """Verdict of a reversed cell, or of a rotor that is mounted or turns the other way round."""
 AS_RECORDED = ("density as recorded", "by the thermometers")
 """Starts of the reason of a density that both files state."""
-ERROR_IN = "error in "
+ERROR_IN = ("error in ", "warning in ")
 """Start of a note on what cannot be so in A or B."""
 # Recorded densities are this good: a barometer, a thermometer and nobody's humidity, share.
 _TOLD_DENSITY, _SURE = 0.012, 2.0
