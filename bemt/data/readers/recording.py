@@ -43,6 +43,7 @@ from bemt.data.readers.split import (
     SplitTable,
     column_numbers,
     decimal_mark,
+    odd_mark,
     some,
     split_table,
     with_unit,
@@ -238,6 +239,7 @@ class Builder:
         if comma:
             got = f"{cells[comma[0]]!r} ({len(comma)} such cells of {label!r})"
             hint = 'State decimal = "," in a recording.toml in the same folder, or export with decimal points'
+            hint += f"; {odd}" if isinstance(self.table, SplitTable) and (odd := odd_mark(self.table)) else ""
             if all(_THOUSANDS.fullmatch(cells[i]) for i in comma):
                 hint = f"A comma between thousands? Export without. If not: {hint[0].lower()}{hint[1:]}"
             self.fault(f"{self.line(comma[0])}:{index + 1}", got, "a number with a decimal point", hint)
