@@ -78,6 +78,11 @@ class Contrast(Answered):
         return self.said.effects
 
     @property
+    def probability(self) -> float | None:
+        """Probability of the verdict [1]; None without one."""
+        return self.said.probability
+
+    @property
     def text(self) -> str:
         """The answer on one screen."""
         return text(self.said)
