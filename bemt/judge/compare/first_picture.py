@@ -267,9 +267,8 @@ def title(doc: ComparedRuns) -> str:
 
 
 def _along(c: MatchedChannel) -> int:
-    """Coordinate of the abscissa: the advance ratio where it alone varies."""
-    steady = c.name not in OVER_COMMAND and float(np.ptp(c.x[:, 0])) < _STEADY
-    return 1 if steady and c.advance_moves() else 0
+    """Coordinate of the abscissa: the advance ratio where it varies."""
+    return int(c.name not in OVER_COMMAND and float(np.ptp(c.x[:, 1])) > _MOVES)
 
 
 def _axis(change: RunChange, c: MatchedChannel) -> tuple[str, Callable[[Array], Array]]:

@@ -6,14 +6,16 @@ No case and no blade is needed. What is not recorded is assumed to be equal in b
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
+from bemt.base.tables import number_of
 from bemt.base.units import ZERO_CELSIUS
+from bemt.data.readers.split import some
 from bemt.data.recordings import cfd_setup
 from bemt.judge.compare import smooth_change as fits
 from bemt.judge.compare.drive_laws import (
@@ -44,7 +46,7 @@ REVERSED = "thrust has the other sign in B, and its size is the same"
 """Verdict of a reversed cell, or of a rotor that is mounted or turns the other way round."""
 AS_RECORDED = ("density as recorded", "by the thermometers")
 """Starts of the reason of a density that both files state."""
-ERROR_IN = "error in "
+ERROR_IN = ("error in ", "warning in ")
 """Start of a note on what cannot be so in A or B."""
 # Recorded densities are this good: a barometer, a thermometer and nobody's humidity, share.
 _TOLD_DENSITY, _SURE = 0.012, 2.0
@@ -340,14 +342,16 @@ def _assumed(a: StandRun, b: StandRun, diameter: float, loads: Mapping[str, Matc
     return [words for open_, words in said if open_]
 
 
-def _notes(a: StandRun, b: StandRun, channels: Mapping[str, MatchedChannel], strays: Mapping[str, int]) -> list[str]:
+def _notes(
+    a: StandRun, b: StandRun, channels: Mapping[str, MatchedChannel], strays: Mapping[str, MatchedChannel]
+) -> list[str]:  # fmt: skip
     other = cfd_setup.other_setup(a.setup, b.setup)
     out = [f"computed otherwise: {other}"] if other else []
     out += [_misread(letter, run) for letter, run in (("A", a), ("B", b)) if run.misread[0]]
     out += [note for c in channels.values() for note in c.notes]
     out += [
-        f"{n} reading{'s' if n > 1 else ''} of {channels[k].channel} far from all others dropped"
-        for k, n in strays.items()
+        f"{number_of(c.y.size, 'reading')} of {c.channel} far from all others dropped: {some(_told_of(c), 3)}"
+        for c in strays.values()
     ]
     for c in channels.values():
         low, high = c.common()
@@ -357,6 +361,15 @@ def _notes(a: StandRun, b: StandRun, channels: Mapping[str, MatchedChannel], str
     if a.command and b.command and a.command != b.command:
         out.append(f"different types of command ({a.command}, {b.command}): the drive is not compared")
     return list(dict.fromkeys([*out, *(f"A: {n}" for n in a.points.notes), *(f"B: {n}" for n in b.points.notes)]))
+
+
+def _told_of(c: MatchedChannel) -> Iterator[str]:
+    """Readings of a channel, each with where it was taken."""
+    at = c.x[:, 0] if c.name in OVER_COMMAND else np.exp(c.x[:, 0])
+    power = 0.0 if c.name in OVER_COMMAND else POWER_OF_SPEED.get(c.channel, 0.0)
+    size = np.exp(c.y + c.log_density * c.second) * at**power
+    for v, x, J, second in zip(size, at, c.x[:, 1], c.second, strict=True):
+        yield f"{v:.4g} at {x:.4g}{f' and advance {J:.2f}' if J else ''} in {'B' if second else 'A'}"
 
 
 def _misread(letter: str, run: StandRun) -> str:
