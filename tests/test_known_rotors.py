@@ -138,6 +138,13 @@ def test_one_hover_makes_the_rotor_this_one() -> None:
     assert propagate(drive, 5400.0, 0.0, bands=False).points.thrust_N[0] == pytest.approx(row["thrust_N"], rel=1e-9)
 
 
+@pytest.mark.parametrize("times", [0.65, 1.45])
+def test_what_is_expected_lies_between_the_label_and_a_far_reading(times: float) -> None:
+    label = estimate.of_label("10x4.5", [6147.0]).thrust_N[0]
+    told = estimate.of_label("10x4.5", [6147.0], reading={"rpm": 6147, "thrust_N": times * label}).thrust_N[0]
+    assert 0.9 < (told - label) / (times * label - label) <= 1.0
+
+
 def test_a_reading_of_a_measured_propeller_keeps_what_was_measured() -> None:
     alone, measured_, both = (
         propagate(labelled(label, **more), 5400.0, 8.0)
