@@ -145,6 +145,12 @@ def test_what_is_expected_lies_between_the_label_and_a_far_reading(times: float)
     assert 0.9 < (told - label) / (times * label - label) <= 1.0
 
 
+@pytest.mark.parametrize(("power_W", "said"), [(71.6, False), (96.5, True)])
+def test_a_power_that_no_such_shaft_takes_is_asked_for_its_motor(power_W: float, said: bool) -> None:
+    doubt = labelled("10x4.5 SF", reading=f"rpm=6147,thrust_g=681,power_W={power_W}").as_built().doubt
+    assert ("wattmeter" in doubt) == said
+
+
 def test_a_reading_of_a_measured_propeller_keeps_what_was_measured() -> None:
     alone, measured_, both = (
         propagate(labelled(label, **more), 5400.0, 8.0)

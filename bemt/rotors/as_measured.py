@@ -46,7 +46,10 @@ class AsMeasured:
     found: Conditioned  # Steps, convergence, evidence
     points: int  # Points of the run that were used [1]
     times: dict[str, float]  # The run's loads over those of the case [1]
-    far: float  # Standard deviations by which its furthest reading lies off what was known of the rotor [1]
+    # Standard deviations by which its furthest reading lies off what was known of the rotor, and its torque above what
+    # its thrust tells besides [1]
+    far: float
+    thirst: float
 
     @property
     def told(self) -> str:
@@ -133,7 +136,9 @@ def as_measured(
     size = np.abs(at.f.reshape(-1)) * mine
     rows = {word: mine & (np.arange(mine.size) // rpm_.size == k) for k, word in enumerate(("thrust", "torque"))}
     times = {w: float(np.abs(target[r]).sum() / size[r].sum()) for w, r in rows.items() if size[r].sum() > 0.0}
-    far = _far(prior, at, target - at.f.reshape(-1) - bias, noise, mine)
+    off = target - at.f.reshape(-1) - bias
+    far = float(np.max(np.abs(_off_by(prior, at, off, noise, mine)), initial=0.0))
+    thirst = float(np.max(_off_by(prior, at, off, noise, rows["torque"]), initial=0.0))
     z = prior.mean
     for _ in range(MOST_PASSES):
         found = condition(
@@ -149,14 +154,14 @@ def as_measured(
     found = replace(found, at=z, f=at.f.reshape(-1) + bias, T=slopes)
     posterior = Prior(found.mean, found.cov, np.ones(1), np.ones(1), "reference")
     reference = ReferenceRun.given(at, noise, target, found)
-    return AsMeasured(prior, posterior, reference, found, int(keep.size), times, far)
+    return AsMeasured(prior, posterior, reference, found, int(keep.size), times, far, thirst)
 
 
-def _far(prior: Prior, at: Sensed, off: Array, noise: Array, mine: NDArray[np.bool_]) -> float:
-    """Largest of ``off``, readings less the case (2 P,), over its standard deviation, given the readings not `mine`."""
+def _off_by(prior: Prior, at: Sensed, off: Array, noise: Array, mine: NDArray[np.bool_]) -> Array:
+    """``off``, readings less the case (2 P,), over their standard deviations, given the readings not `mine`; of these."""
     T = at.T.transpose(0, 2, 1).reshape(off.size, -1)
     S = noise + T @ prior.cov @ T.T * float(prior.weights @ prior.sizes**2)
     off, rest = off - T @ prior.mean, ~mine & np.isfinite(off)
     gain = np.linalg.solve(S[np.ix_(rest, rest)], S[np.ix_(rest, mine)]).T
     variance = np.diag(S)[mine] - np.einsum("ij,ij->i", gain, S[np.ix_(mine, rest)])
-    return float(np.max(np.abs(off[mine] - gain @ off[rest]) / np.sqrt(variance), initial=0.0))
+    return np.asarray((off[mine] - gain @ off[rest]) / np.sqrt(variance))
