@@ -294,14 +294,17 @@ def test_betaflight_headings_of_each_tool(quote: str, tmp_path: Path) -> None:
     time = "time (us)" if quote == " " else "time"
     names = [f"{stem}[{i}]" for stem in ("motor", "eRPM") for i in range(4)]
     lines = (
-        [row("motor_poles", 14), row("motorOutput", "158,2047"), row("yaw_motors_reversed", 1)] if quote == '"' else []
-    )
+        [row("Firmware revision", "Betaflight 4.4.2 (2cf7d0a1d) STM32F7X2"), row("motor_poles", 14),
+         row("motorOutput", "158,2047"), row("yaw_motors_reversed", 1)] if quote == '"' else []
+    )  # fmt: skip
+    volts = "1590" if quote == '"' else "15.9"
     lines.append(row("loopIteration", time, *names, "vbatLatest"))
-    lines += [f"{k},{k * 2000},{','.join(str(900 + i + k % 3) for i in range(4))},2000,2000,2000,2000,15.9"
+    lines += [f"{k},{k * 2000},{','.join(str(900 + i + k % 3) for i in range(4))},2000,2000,2000,2000,{volts}"
               for k in range(400)]  # fmt: skip
     (tmp_path / "log.csv").write_text("\n".join(lines))
     log = read_log(tmp_path / "log.csv")
     assert log.command is not None and log.t[1] == pytest.approx(0.002)
+    assert log.voltage is not None and log.voltage[0] == pytest.approx(15.9)
     if quote == '"':
         assert log.layout == "betaflight-x-rev" and log.rpm is not None
         assert log.rpm[0, 0] == pytest.approx(200000 / 7) and log.command[0, 0] == pytest.approx((900 - 158) / 1889)

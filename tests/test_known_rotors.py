@@ -138,6 +138,19 @@ def test_one_hover_makes_the_rotor_this_one() -> None:
     assert propagate(drive, 5400.0, 0.0, bands=False).points.thrust_N[0] == pytest.approx(row["thrust_N"], rel=1e-9)
 
 
+@pytest.mark.parametrize("times", [0.65, 1.45])
+def test_what_is_expected_lies_between_the_label_and_a_far_reading(times: float) -> None:
+    label = estimate.of_label("10x4.5", [6147.0]).thrust_N[0]
+    told = estimate.of_label("10x4.5", [6147.0], reading={"rpm": 6147, "thrust_N": times * label}).thrust_N[0]
+    assert 0.9 < (told - label) / (times * label - label) <= 1.0
+
+
+@pytest.mark.parametrize(("power_W", "said"), [(71.6, False), (96.5, True)])
+def test_a_power_that_no_such_shaft_takes_is_asked_for_its_motor(power_W: float, said: bool) -> None:
+    doubt = labelled("10x4.5 SF", reading=f"rpm=6147,thrust_g=681,power_W={power_W}").as_built().doubt
+    assert ("wattmeter" in doubt) == said
+
+
 def test_a_reading_of_a_measured_propeller_keeps_what_was_measured() -> None:
     alone, measured_, both = (
         propagate(labelled(label, **more), 5400.0, 8.0)

@@ -57,7 +57,7 @@ def estimate(
         Angles between wind and shaft: 0 climb, 90 edgewise, 180 descent. [deg]
     reading : str or mapping, optional
         One reading of this propeller, or several: ``rpm=5400,thrust_g=410`` with
-        ``airspeed_m_s`` and ``power_W`` if known.
+        ``airspeed_m_s`` and ``power_W``, that of the shaft, if known.
 
     Returns
     -------

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +14,7 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_text
 from bemt.physics import coefficients as co
-from bemt.rotors.conditioning import SESSION, Conditioned, ReferenceRun, condition, noise_of_run, scatter
+from bemt.rotors.conditioning import SESSION, TOLERANCE, Conditioned, ReferenceRun, condition, noise_of_run, scatter
 from bemt.rotors.latents import Prior, Sensed
 from bemt.rotors.model import air_fields, air_of_points, beta75_deg, coefficients
 from bemt.rotors.population import WEIGHTS, population
@@ -30,6 +30,8 @@ FACTOR = 3.0
 """Load over that of the case, or under it, that is another rotor's [1]."""
 FAR = 4.0
 """Standard deviations off what was known of the rotor from which on a reading is doubted [1]."""
+MOST_PASSES = 4
+"""What the rotor is found with, rest and bias, goes by the loads of the rotor found: taken anew so often at most [1]."""
 MOST_POINTS = 40
 """Points beyond this number are averaged with their neighbours in (J, rpm) [1]."""
 
@@ -44,7 +46,10 @@ class AsMeasured:
     found: Conditioned  # Steps, convergence, evidence
     points: int  # Points of the run that were used [1]
     times: dict[str, float]  # The run's loads over those of the case [1]
-    far: float  # Standard deviations by which its furthest reading lies off what was known of the rotor [1]
+    # Standard deviations by which its furthest reading lies off what was known of the rotor, and its torque above what
+    # its thrust tells besides [1]
+    far: float
+    thirst: float
 
     @property
     def told(self) -> str:
@@ -114,35 +119,49 @@ def as_measured(
     points = np.arange(rpm_.size)
     speed = J_ * rpm_ / 60.0 * ready.diameter_m
     Re = np.asarray(co.Re75(ready.chord75_m, rpm_ / 60.0, ready.diameter_m, speed, state.rho, state.mu))
-    at = sense(solve, ready.diameter_m, beta75_deg(ready), rpm_, J_, Re)
     y = np.array([mean(CT), mean(CP)])
-    still = np.abs(J_) < _STILL
-    rough = np.array([[scatter(a, Re[still])] for a in (y - at.f)[:, still]]) * still
-    single = np.maximum(np.hypot(np.array([mean(u_CT), mean(u_CP)]), people.noise_sd(at)) * share, rough)
-    noise = noise_of_run(people, at, y, single, gain, others, foreign)
-    target = y.reshape(-1)
-    bias = people.bias(at).reshape(-1)
-    found = condition(
-        lambda z: solve(z, rpm_, J_, points).reshape(-1) + bias, prior, target, noise, people.rest_sizes, WEIGHTS
-    )
+    target, u, still = y.reshape(-1), np.array([mean(u_CT), mean(u_CP)]), np.abs(J_) < _STILL
+
+    def sensed(z: Array | None = None) -> tuple[Sensed, Array, Array]:
+        """The solver at the points, what it lacks in the mean and the covariance of the rest: both go by the loads."""
+        at = sense(solve, ready.diameter_m, beta75_deg(ready), rpm_, J_, Re, z)
+        rough = np.array([[scatter(a, Re[still])] for a in (y - at.f)[:, still]]) * still
+        single = np.maximum(np.hypot(u, people.noise_sd(at)) * share, rough)
+        return at, people.bias(at).reshape(-1), noise_of_run(people, at, y, single, gain, others, foreign)
+
+    at, bias, noise = sensed()
     mine = np.tile(np.ones(rpm_.size, bool) if foreign is None else ~foreign, 2) & np.isfinite(
         target + at.f.reshape(-1)
     )
     size = np.abs(at.f.reshape(-1)) * mine
     rows = {word: mine & (np.arange(mine.size) // rpm_.size == k) for k, word in enumerate(("thrust", "torque"))}
     times = {w: float(np.abs(target[r]).sum() / size[r].sum()) for w, r in rows.items() if size[r].sum() > 0.0}
-    far = _far(prior, at, target - at.f.reshape(-1) - bias, noise, mine)
+    off = target - at.f.reshape(-1) - bias
+    far = float(np.max(np.abs(_off_by(prior, at, off, noise, mine)), initial=0.0))
+    thirst = float(np.max(_off_by(prior, at, off, noise, rows["torque"]), initial=0.0))
+    z = prior.mean
+    for _ in range(MOST_PASSES):
+        found = condition(
+            lambda z, b=bias: solve(z, rpm_, J_, points).reshape(-1) + b,  # type: ignore[misc]
+            prior, target, noise, people.rest_sizes, WEIGHTS,
+        )  # fmt: skip
+        there = np.abs(found.mean - z) <= TOLERANCE * np.sqrt(np.diag(found.cov))
+        z = found.mean
+        at, bias, noise = sensed(z)  # as predictions will see it
+        if there.all():
+            break
+    slopes = at.T.transpose(0, 2, 1).reshape(target.size, -1)
+    found = replace(found, at=z, f=at.f.reshape(-1) + bias, T=slopes)
     posterior = Prior(found.mean, found.cov, np.ones(1), np.ones(1), "reference")
-    at = sense(solve, ready.diameter_m, beta75_deg(ready), rpm_, J_, Re, found.mean)  # as predictions will see it
     reference = ReferenceRun.given(at, noise, target, found)
-    return AsMeasured(prior, posterior, reference, found, int(keep.size), times, far)
+    return AsMeasured(prior, posterior, reference, found, int(keep.size), times, far, thirst)
 
 
-def _far(prior: Prior, at: Sensed, off: Array, noise: Array, mine: NDArray[np.bool_]) -> float:
-    """Largest of ``off``, readings less the case (2 P,), over its standard deviation, given the readings not `mine`."""
+def _off_by(prior: Prior, at: Sensed, off: Array, noise: Array, mine: NDArray[np.bool_]) -> Array:
+    """``off``, readings less the case (2 P,), over their standard deviations, given the readings not `mine`; of these."""
     T = at.T.transpose(0, 2, 1).reshape(off.size, -1)
     S = noise + T @ prior.cov @ T.T * float(prior.weights @ prior.sizes**2)
     off, rest = off - T @ prior.mean, ~mine & np.isfinite(off)
     gain = np.linalg.solve(S[np.ix_(rest, rest)], S[np.ix_(rest, mine)]).T
     variance = np.diag(S)[mine] - np.einsum("ij,ij->i", gain, S[np.ix_(mine, rest)])
-    return float(np.max(np.abs(off[mine] - gain @ off[rest]) / np.sqrt(variance), initial=0.0))
+    return np.asarray((off[mine] - gain @ off[rest]) / np.sqrt(variance))

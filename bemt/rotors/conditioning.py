@@ -36,9 +36,6 @@ class Conditioned:
     # (M,), (M, K) The solver and its tangents there [unit of the readings]
     f: Array
     T: Array
-    # (M,) ``f - T (at - prior mean)``: the baseline for which a prior centred at the case counts nothing twice [of the
-    # readings]
-    f0: Array
     # (S,) Heavy tail: factors on the prior's standard deviations and their posterior probabilities [1]
     sizes: Array
     weights: Array
@@ -104,9 +101,8 @@ def condition(
             again = condition(solve, prior, y, excess * noise, noise_sizes, noise_weights, tolerance, most)
             return replace(again, excess=excess * again.excess)
     return Conditioned(
-        here.mean, here.cov, z, f, T, f - T @ (z - prior.mean), prior.sizes, here.weights, steps, converged,
-        here.noise_size, here.log_evidence,
-    )  # fmt: skip
+        here.mean, here.cov, z, f, T, prior.sizes, here.weights, steps, converged, here.noise_size, here.log_evidence
+    )
 
 
 @dataclass(frozen=True, eq=False)

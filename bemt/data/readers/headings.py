@@ -16,12 +16,12 @@ from bemt.data.readers._words import english, of_others, plain, quantities
 from bemt.data.readers.unit_text import (
     FORCES,
     TWO_MEANINGS,
-    WEIGHTS,
     either,
     si_name,
     splits,
     unit_for,
     unit_of,
+    weighs,
 )
 
 _RPM = units.UNITS["rpm"]
@@ -198,7 +198,7 @@ def meanings(text: str) -> list[str]:
     >>> meanings("Schub"), meanings("speed"), meanings("wibble")
     (['thrust'], ['rpm', 'airspeed'], [])
     """
-    known = quantities(english(re.split(r"[(\[]", text)[0]))
+    known = quantities(english(re.split(r"[(\[]|\s(?:in|en|em)\s", text)[0]))
     found = [name for name, dimension in known if dimension != "acceleration"]
     return ["power" if name == "mechanical power" else name.replace(" ", "_") for name in found]
 
@@ -279,7 +279,7 @@ def heading(text: str) -> Heading:
         told = f"{text!r} is read as thousands of revolutions per minute"
         return replace(found, text=text, unit=units.Unit("", "angular_speed", 1e3), told=told)
     parts = re.fullmatch(r"(.*?)\s*[\(\[]\s*([^()\[\]]*?)\s*[\)\]]\s*", text)
-    if not parts and (loose := re.fullmatch(r"(.+?)(?:[_ ]| - |, ?)(\w+)", text)) and loose[2] in WEIGHTS:
+    if not parts and (loose := re.fullmatch(r"(.+?)(?:[_ ]| - |, ?)(\w+)", text)) and weighs(loose[2]):
         parts = loose  # thrust_g, Thrust kg
     uncertainty = text.startswith("u_") and _by_words(text[2:]) is not None  # u_inf is none
     if not uncertainty and (by_words := _by_words(text)) is not None:
@@ -294,7 +294,7 @@ def heading(text: str) -> Heading:
 
 def _as_stands_mean(text: str, base: str, stated: str) -> Heading | None:
     """Heading with a unit as stands mean it: a mass for its weight, hertz for turns; None: any other."""
-    unit = WEIGHTS.get(stated)
+    unit = weighs(stated)
     if unit and _THRUSTS.fullmatch(plain(base)):
         told = f"{text!r} is read as {FORCES[unit]}: 1 {stated} weighs {units.UNITS[unit].factor:.4g} N"
         return replace(heading(f"{base} ({unit})"), text=text, told=told)
@@ -312,7 +312,7 @@ def unit_alone(text: str) -> units.Unit | None:
     >>> [unit.suffix if (unit := unit_alone(text)) else "" for text in ("Watt", "Grams", "Amps", "A", "Thrust", "rpm")]
     ['W', 'gf', 'A', '', '', '']
     """
-    found = unit_for("force", text.lower()) if text.lower() in WEIGHTS else unit_for("", text)
+    found = unit_for("force", text) if weighs(text) else unit_for("", text)
     known = found is not None and found[0].dimension in _ALONE and len(text) > 2
     return found[0] if found is not None and known else None
 

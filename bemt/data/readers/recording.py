@@ -24,7 +24,7 @@ from bemt.base.errors import Fault, refuse
 from bemt.base.tables import number_of
 from bemt.data.readers import load_text
 from bemt.data.readers._large import NumberTable
-from bemt.data.readers._words import DIMENSIONS, english, quantities
+from bemt.data.readers._words import DIMENSIONS, english
 from bemt.data.readers.headings import (
     CELLS,
     Heading,
@@ -418,7 +418,7 @@ def _asked(headings: Sequence[str], channels: Iterable[str]) -> dict[str, str]:
     names = [label[1:].rsplit("'", 1)[0].split("' (")[0] for label in headings]
     channels = {*channels} - {slug(name) for name in names}
     for name in names:
-        found = set(meanings(name))
+        found = {"rpm"} if surely_shaft_speed(name) else set(meanings(name))
         found -= {"pulse_width"} if "throttle" in found else set()
         quantity = found.pop() if len(found) == 1 else ""
         if quantity and not any(k == quantity or k.startswith(f"{quantity}_") for k in channels):
@@ -442,15 +442,15 @@ def _nearest(headings: Sequence[str], channels: Iterable[str] = ()) -> str:
         word = re.split(r"[\s_(\[]", name.strip().lower())[0]
         found = _speeds_meant(name, channels) if may_be_shaft_speed(name) else None
         if found is None:
-            known = [q for q, _ in quantities(english(name)) if q in _MEANINGS]
+            known = [q for q in meanings(name) if q in _MEANINGS]
             found = known[:1] or difflib.get_close_matches(word, _MEANINGS, 1, 0.75)
         if found:
             near[name] = found
     if not near:
         return ""
-    name, meanings = next(iter(near.items()))
+    name, meant = next(iter(near.items()))
     lines = [
-        f'{m} = {{ column = "{name}", unit = "..." }}, unit {some(units.suffixes(DIMENSIONS[m]), 5)}' for m in meanings
+        f'{m} = {{ column = "{name}", unit = "..." }}, unit {some(units.suffixes(DIMENSIONS[m]), 5)}' for m in meant
     ]
     told = ", ".join(f"{k!r} {' or '.join(v)}" for k, v in near.items())
     return f"; nearest meaning: {told}. The line: [columns] {', or '.join(lines)}"

@@ -31,7 +31,7 @@ import numpy as np
 from bemt.base import units
 from bemt.base.tables import number_of
 from bemt.data.readers import SourceText, head_text, load_text, number
-from bemt.data.readers.unit_text import WEIGHTS, unit_of
+from bemt.data.readers.unit_text import unit_of, weighs
 from bemt.physics.dataset import Dataset
 
 KIND = "references"
@@ -116,7 +116,7 @@ def _unit_factor(quantity: str, written: str) -> tuple[float, tuple[str, str, st
         unit = unit_of(form)
         if isinstance(unit, units.Unit) and unit.dimension == dimension:
             return (unit.factor / units.RPM if quantity == "rpm" else unit.factor), None
-    weight = WEIGHTS.get(key) if dimension == "force" else None
+    weight = weighs(key) if dimension == "force" else ""
     hint = f"A mass is not a force: write {weight}" if weight else _near(parts, known)
     return math.nan, (f"unit {written!r}", f"one of {', '.join(known)}", hint)
 

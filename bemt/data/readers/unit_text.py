@@ -29,6 +29,7 @@ _SAME = {
     "giri/min": "rpm", "giri/1'": "rpm", "об/мин": "rpm", "转/分": "rpm", "轉/分": "rpm", "r/m": "rpm",
     "omw/min": "rpm",
     "obr/min": "rpm", "ot/min": "rpm", "tours/min": "rpm", "trs/min": "rpm", "rpm/min": "rpm", "rot/min": "rpm",
+    "per minute": "rpm", "pro minute": "rpm", "par minute": "rpm", "por minuto": "rpm", "al minuto": "rpm",
     "min -1": "rpm", "kts": "kt", "fps": "ft_s", "kph": "km_h", "kmh": "km_h", "kilowatt": "kW", "millivolt": "mV",
     "sek": "s", "seg": "s", "secondes": "s", "sekunden": "s", "segundos": "s", "secondi": "s", "秒": "s", "с": "s",
     "в": "V", "а": "A", "вт": "W", "н": "N", "нм": "Nm", "н м": "Nm", "安": "A", "伏": "V", "瓦": "W", "牛": "N",
@@ -64,12 +65,12 @@ _COMPOUND = {
 _MOJIBAKE = (("Âµ", "µ"), ("Âμ", "µ"), ("Î¼", "µ"), ("Â·", "·"), ("â‹…", "·"), ("Â°", "°"), ("Â²", "²"), ("Â³", "³"))
 """UTF-8 that a program took for Latin-1 or its Windows form."""
 WEIGHTS = {
-    "g": "gf", "G": "gf", "grams": "gf", "gram": "gf", "gr": "gf", "gramm": "gf", "kg": "kgf", "Kg": "kgf", "KG": "kgf",
-    "kgs": "kgf", "kilograms": "kgf", "lb": "lbf", "lbs": "lbf", "pounds": "lbf", "oz": "ozf", "ounces": "ozf",
-    "grammes": "gf", "grammi": "gf", "gramos": "gf", "gramas": "gf", "г": "gf", "гр": "gf", "克": "gf", "кг": "kgf",
-    "公斤": "kgf", "GRAMS": "gf", "GRAM": "gf", "LB": "lbf", "LBS": "lbf", "OZ": "ozf", "kilogram": "kgf",
+    "g": "gf", "grams": "gf", "gram": "gf", "gr": "gf", "gramm": "gf", "kg": "kgf", "kgs": "kgf", "kilograms": "kgf",
+    "kilogram": "kgf", "kilogramm": "kgf", "lb": "lbf", "lbs": "lbf", "pounds": "lbf", "oz": "ozf", "ounces": "ozf",
+    "gramme": "gf", "grammes": "gf", "grammi": "gf", "gramos": "gf", "gramas": "gf", "г": "gf", "гр": "gf", "克": "gf",
+    "кг": "kgf", "公斤": "kgf",
 }  # fmt: skip
-"""Units of mass in which stands state a force: that which the mass weighs."""
+"""Units of mass in which stands state a force, that which the mass weighs: in small letters, as `weighs` takes them."""
 FORCES = {"gf": "gram-force", "kgf": "kilogram-force", "lbf": "pound-force", "ozf": "ounce-force"}
 _ANY_CASE = {"v": "V", "a": "A", "w": "W", "n": "N", "nm": "Nm", "gf": "gf", "kgf": "kgf", "lbf": "lbf", "s": "s",
              "kw": "kW", "pa": "Pa", "hpa": "hPa", "kpa": "kPa", "c": "C", "f": "F", "k": "K", "ncm": "Ncm", "hp": "hp",
@@ -121,12 +122,21 @@ def unit_of(text: str) -> units.Unit | str:
     return ""
 
 
+def weighs(text: str) -> str:
+    """Force that a unit of mass stands for, in any letters; "" for any other text.
+
+    >>> weighs("Gramm"), weighs("KG"), weighs("N")
+    ('gf', 'kgf', '')
+    """
+    return WEIGHTS.get(unicodedata.normalize("NFKC", text).lower(), "")
+
+
 def unit_for(dimension: str, text: str) -> tuple[units.Unit, str] | None:
     """Unit of a quantity of known dimension ("": any), and what was taken for granted."""
     found = unit_of(text)
     if not dimension:
         return (found, "") if isinstance(found, units.Unit) else None
-    if dimension == "force" and (weight := WEIGHTS.get(unicodedata.normalize("NFKC", text))):
+    if dimension == "force" and (weight := weighs(text)):
         return units.UNITS[weight], f"{FORCES[weight]}: 1 {text} weighs {units.UNITS[weight].factor:.4g} N"
     if dimension == "torque" and isinstance(found, str) and (weight := weight_of(text)):
         made = unit_of(weight)
@@ -144,9 +154,9 @@ def weight_of(text: str) -> str:
     words = re.split(r"[\s·⋅*.\-/]+", text.strip())
     if len(words) != 2:
         return ""
-    masses = [w for w in words if w in WEIGHTS]
+    masses = [w for w in words if weighs(w)]
     lengths = [w for w in words if w in ("cm", "m", "in", "ft", "mm")]
-    unit = f"{WEIGHTS[masses[0]]} {lengths[0]}" if len(masses) == 1 == len(lengths) else ""
+    unit = f"{weighs(masses[0])} {lengths[0]}" if len(masses) == 1 == len(lengths) else ""
     return unit if isinstance(unit_of(unit), units.Unit) else ""
 
 

@@ -351,7 +351,7 @@ def flipped(facts: Facts) -> Iterator[Finding]:
         if share > 0.9:
             text = f"negative in {share:.0%} of the rows under load, down to {np.nanmin(v):.4g}"
             habit = "note" if name == "torque_Nm" else "warning"  # either hand of rotation is usual
-            fix = "multiply by -1 (sign = -1 in a recording.toml)"
+            fix = f"multiply by -1 (--sign {name.rsplit('_', 1)[0]}=-1)"
             more = "; or the rotor turns the other way" if name == "torque_Nm" else ""
             yield Finding("sign_flipped", facts.named(name), text, fix + more, (), habit)
             continue

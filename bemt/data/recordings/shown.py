@@ -25,6 +25,7 @@ from bemt.base import tables
 from bemt.base.averaging import Mean
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK
 from bemt.data.readers.cfd_run import KIND as RUN
+from bemt.data.readers.headings import USUAL
 from bemt.data.readers.recording import Remark
 from bemt.data.recordings import cfd_run
 from bemt.data.recordings.cfd_setup import CfdRun
@@ -267,15 +268,21 @@ class Imported:
         """What to do with recordings of loads, if they have the speed; first what states a load that was not read."""
         if steps := [f.step for f in self.files if f.step]:
             return [f"Next: {steps[0]}\n"]
+        flips = [{USUAL.get(g.channel, g.channel).rsplit("_", 1)[0] for g in f.findings
+                  if g.id == "sign_flipped" and g.severity == "warning"} for f in self.files]  # fmt: skip
+        if turned := sorted(set[str]().union(*flips).intersection(*flips)):
+            said = {**said, "sign": [*said.get("sign", ()), *(f"{quantity}=-1" for quantity in turned)]}
         read = [(f.path, f.record.kind, set(named(f.record).values)) for f in self.files if f.record]
         loaded = [shlex.quote(p) for p, _, known in read if _LOADS & known and "rpm" in {*known, *said}]
-        if not loaded and any(_LOADS & channels for _, kind, channels in read if kind == "bench"):
-            return ["Next: a column headed rpm, the speed of every row; no model can be set beside loads without it\n"]
+        alone = [shlex.quote(p) for p, kind, known in read if kind == "bench" and _LOADS & known]
+        how = options_of({k: v for k, v in said.items() if k in ("unit", "column", "sign")})
+        if alone and not loaded:
+            pair = " ".join(["bemt compare", *(alone if len(alone) == 2 else [alone[0], "ANOTHER_RUN"]), *how])
+            return [f"Next: {pair}   (beside a model: a column headed rpm, the speed of every row)\n"]
         if not loaded:
             return []
         step = f"Next: {' '.join(['bemt diagnose', loaded[0], *options_of(said)])}{_a_case(said)}\n"
-        pair = options_of({k: v for k, v in said.items() if k in ("unit", "column", "sign")})
-        return [step + (f"      {' '.join(['bemt compare', *loaded, *pair])}\n" if len(loaded) == 2 else "")]
+        return [step + (f"      {' '.join(['bemt compare', *loaded, *how])}\n" if len(loaded) == 2 else "")]
 
 
 def _a_case(said: Mapping[str, Sequence[str | float]]) -> str:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.data.recordings import cfd_setup
-from bemt.data.recordings.channels import moves, named
+from bemt.data.recordings.channels import in_one_step, moves, named
 from bemt.data.recordings.reduce import reduce, reduction
 from bemt.judge.compare.selection import COLD, HOT, LOAD_CHANNELS, conditions_of, one_rotor, speed_in_doubt, wind_of
 from bemt.physics.dataset import DIMENSIONLESS, Dataset
@@ -70,7 +70,10 @@ def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> 
     series, ramp = _reduced(imported, diameter_m)
     values = {k: series[k] for k in _WANTED if k in series}
     if not {"thrust_N", "torque_Nm", "power_W"} & values.keys() and "rpm" not in values and "J" not in values:
-        raise InputError(Fault(name, "", "no speed", "rpm, or J with coefficients", "Nothing to compare at"))
+        if {"CT", "CP", "CQ"} & values.keys():
+            raise InputError(Fault(name, "", "coefficients without a speed", "J or rpm beside them"))
+        expected = f"thrust, torque or shaft power, with its unit{in_one_step(imported)}"
+        raise InputError(Fault(name, "", "no load and no speed", expected))
     command = next((k for k in ("pwm_s", "throttle") if k in series and moves(series[k])), "")
     if command:
         values["command"] = series[command]

@@ -32,12 +32,14 @@ SETTLED = frozenset({
 """Assumptions that readings of a rotor settle: its latent numbers take their place."""
 DENSITY = 1.225
 """Air of a reading that states none [kg/m3]."""
+THIRST = 2.0
+"""Standard deviations above what its thrust tells from which on a power is doubted to be that of the shaft [1]."""
 _NAMES = {"rpm": "angular_speed", "n": "angular_speed", "thrust": "force", "T": "force", "weight": "force",
           "torque": "torque", "Q": "torque", "power": "power", "P": "power", "airspeed": "speed", "V": "speed",
           "density": "density"}  # fmt: skip
 _PLAIN = {"rpm": "rpm", "V": "m_s", "T": "N", "Q": "Nm", "P": "W", "n": "rev_s"}
 _SHORT = {"T": "thrust", "weight": "thrust", "Q": "torque", "P": "power", "V": "airspeed", "n": "rpm"}
-_EXPECTED = "rpm=5400,thrust_g=410 and, if known, airspeed_m_s=, power_W= or torque_Nm=, density_kg_m3="
+_EXPECTED = "rpm=5400,thrust_g=410 and, if known, airspeed_m_s=, power_W= of the shaft or torque_Nm=, density_kg_m3="
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,7 @@ class RotorReading:
     torque_Nm: float  # Of the shaft
     airspeed_m_s: float
     density_kg_m3: float
+    by_power: bool = False  # The torque is that of a power
 
 
 def parse_reading(text: str, where: str = "--reading") -> tuple[RotorReading, ...]:
@@ -89,7 +92,7 @@ def parse_reading(text: str, where: str = "--reading") -> tuple[RotorReading, ..
         if "power" in found and not faults:
             torque = found["power"] / (rpm * math.pi / 30.0)
         out.append(RotorReading(rpm, found.get("thrust", math.nan), torque, found.get("airspeed", 0.0),
-                           found.get("density", DENSITY)))  # fmt: skip
+                           found.get("density", DENSITY), "power" in found))  # fmt: skip
     if not out and not faults:
         faults.append(Fault(where, "", repr(text), _EXPECTED))
     refuse(faults)
@@ -174,8 +177,14 @@ def conditioned(case: Case, text: str) -> CaseAsBuilt:
     )
     found.check(f"reading {text!r}")
     known_as = replace(found.posterior, known_from="reference")
-    off = f"{found.far:.2g} standard deviations off what is known of this rotor: {found.told} what the case gives"
-    doubt = f"reading {text!r}: {off}. Unit, speed or label?" if found.far > FAR else ""
+    asks = []
+    if found.far > FAR:
+        off = f"{found.far:.2g} standard deviations off what is known of this rotor: {found.told} what the case gives"
+        asks.append(f"{off}. Unit, speed or label?")
+    if found.thirst > THIRST and any(r.by_power for r in readings):
+        off = f"its power lies {found.thirst:.2g} standard deviations above that of such a rotor"
+        asks.append(f"{off}: is it that of the shaft? A wattmeter reads the losses of the motor, too")
+    doubt = f"reading {text!r}: {'; '.join(asks)}" if asks else ""
     told = " and ".join([f"its reading {text}", *([f"its measurement in the {known.source}"] if known else [])])
     return CaseAsBuilt(known_as, found.posterior.mean, found.reference, doubt, told)
 

@@ -1,8 +1,8 @@
 """Flights as CSV, plain or gzipped: Betaflight blackbox, variables of a Crazyflie, arrays in cells (t, v, R, pwm, fa).
 
 Betaflight (blackbox_decode): time in us, motor[i] 1000 to 2000 or DShot, eRPM[i] in hundreds of electrical rev/min,
-accSmooth counts, vbatLatest in V. Mechanical speed needs the pole count and acceleration the counts of 1 g: eRPM is
-used only with a row motor_poles before the headings, accSmooth with acc_1G.
+accSmooth counts, vbatLatest and amperageLatest as `_electric` says. Mechanical speed needs the pole count and
+acceleration the counts of 1 g: eRPM is used only with a row motor_poles before the headings, accSmooth with acc_1G.
 """
 
 from __future__ import annotations
@@ -71,7 +71,8 @@ def read(path: Path) -> FlightLog:
                   and re.search(r"motor\[|motor\.|pwm|rpm|controller\.cmd", line, re.IGNORECASE)), None)  # fmt: skip
     if start is None:
         raise InputError(Fault(name, "", "no row of headings with a time and motors", _READ))
-    said = {m[1]: m[2] for line in lines[:start] if (m := re.match(r'"?(\w+)"?,"?([^"]*)"?\s*$', line))}
+    said = {m[1]: m[2] for line in lines[:start] if (m := re.match(r'"?([\w ]+)"?,"?([^"]*)"?\s*$', line))}
+    said |= dict(re.findall(r"(\w+) \((\w+)\)", lines[start]))  # vbatLatest (V)
     try:
         with path.open("rb") as rows:
             for _ in range(start):
@@ -191,8 +192,8 @@ def _betaflight(name: str, numbers: pd.DataFrame, said: dict[str, str]) -> Fligh
     sources = {
         "command": command, "rpm": many("eRPM", 200.0 / poles) if poles > 0.0 else None, "rates": gyro,
         "acceleration": many("accSmooth", G0 / per_g) if per_g > 0.0 else None,
-        "voltage": (t, numbers[volt].to_numpy(float)) if volt else None,
-        "battery_current": (t, numbers[amp].to_numpy(float)) if amp else None,
+        "voltage": (t, _electric(volt, said) * numbers[volt].to_numpy(float)) if volt else None,
+        "battery_current": (t, _electric(amp, said) * numbers[amp].to_numpy(float)) if amp else None,
     }  # fmt: skip
     B = command[1].shape[1] if command else 0
     turned = "-rev" if _number(said.get("yaw_motors_reversed")) else ""
@@ -201,6 +202,21 @@ def _betaflight(name: str, numbers: pd.DataFrame, said: dict[str, str]) -> Fligh
     raw = raw if raw is not None and raw[1].shape[1] == 3 else None
     main = "command" if command else "rpm"
     return joined(name, "Betaflight CSV", sources, main, raw=raw, raw_unit="rad/s", layout=layout)
+
+
+def _electric(column: str, said: dict[str, str]) -> float:
+    """Volts or amperes of one count: as the heading says, else as the firmware counts (Blackbox Explorer, presenter).
+
+    >>> [_electric("vbatLatest", {"Firmware revision": f"Betaflight {v}"}) for v in ("4.4.2 (2cf7d0a1d)", "3.5.7")]
+    [0.01, 0.1]
+    """
+    if unit := said.get(column):
+        return {"V": 1.0, "A": 1.0, "mV": 1e-3, "mA": 1e-3}.get(unit, np.nan)
+    version = re.match(r"Betaflight (\d+)\.(\d+)", said.get("Firmware revision", ""))
+    if version is None:
+        return 1.0
+    counts = (int(version[1]), int(version[2]))
+    return 0.01 if counts >= (4, 0) or column.startswith("amperage") else 0.1 if counts >= (3, 1) else np.nan
 
 
 def _number(text: str | None) -> float:

@@ -205,8 +205,20 @@ def _stands_out(shake: Vibration) -> bool:
 
 def _seen(a: FlightAnswer) -> list[str]:
     """Lines on what this flight alone shows."""
-    parts = (_drives, _moved, _by_rotor, _demanded, _heard, _along_axes, _blown)
+    parts = (_beside_case, _drives, _moved, _by_rotor, _demanded, _heard, _along_axes, _blown)
     return [f"  {line}" for part in parts for line in part(a)]
+
+
+def _beside_case(a: FlightAnswer) -> list[str]:
+    """Thrust at equal speed beside that of the case; without a mass, the mass that the case would carry."""
+    k, said = a.found.constants.get("thrust constant"), a.predicted
+    if k is None or said is None:
+        return []
+    ratio, half = k.value / said.constant, np.hypot(k.half / k.value, 2.0 * said.u / said.constant)
+    if k.unit.endswith("/kg"):
+        carried = f"{number_text(1e3 / ratio, 3)} ± {number_text(1e3 / ratio * half, 2)} g"
+        return [f"With the thrust of the case at these speeds it would weigh {carried}: --mass-kg compares them."]
+    return [f"Thrust at equal speed: {100 * (ratio - 1.0):+.0f} ± {100 * ratio * half:.0f} % from the case."]
 
 
 def _drives(a: FlightAnswer) -> list[str]:
@@ -287,6 +299,7 @@ def _along_axes(a: FlightAnswer) -> list[str]:
     if not shake.rms or not np.isfinite(shake.rms[0]):
         return []
     said = "as the autopilot states it (VIBE)" if shake.stated else "above 20 Hz"
+    said = f"of the gyro {said}" if shake.unit == "rad/s" else said
     each = ", ".join(f"{v:.2g}" for v in shake.rms)
     more = f", in all {a.louder:.1f} times that of the healthy flights" if np.isfinite(a.louder) else ""
     return [f"Vibration {said}: {each} {shake.unit} in x, y, z (root mean square){more}."]

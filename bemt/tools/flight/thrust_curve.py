@@ -23,14 +23,15 @@ from bemt.tools.flight.log import FlightLog
 from bemt.tools.flight.repeat import BATCHES, block_means, flight_scatter, half_width, jackknifed, regressed
 
 _BLOCK_S, _WIDE, _SCATTER = 0.25, 0.5, 0.14
-"""Length of a mean [s]; half width of e from which it is not given; standard deviation of e between flights [1]."""
+"""Length of a mean [s]; half width of e, and share of the hover throttle, from which it is not given; standard deviation of e between flights [1]."""
 _NAMES = {"ArduPilot DataFlash": ("MOT_THST_EXPO", "MOT_THST_HOVER"), "PX4 ULog": ("THR_MDL_FAC", "MPC_THR_HOVER")}
 
 
 def thrust_curve(log: FlightLog) -> dict[str, Constant]:
-    """Parameters of the thrust curve that an autopilot asks for, by its names; of other logs by both.
+    """Parameters of the thrust curve that an autopilot asks for, by its names where it has them.
 
-    The hover throttle is that of the curve that the flight shows, else of the one that is set. Empty where the log has
+    The hover throttle is that of the curve that the flight shows, else of the one that is set; left out where its band
+    is half of it. Empty where the log has
     no commands as shares, or less than 6 s in the air.
     """
     from scipy import stats
@@ -38,7 +39,7 @@ def thrust_curve(log: FlightLog) -> dict[str, Constant]:
     x, on = _share(log), log.flying
     if x is None or on.sum() < 200 or float(np.ptp(log.t[on])) < 6.0:
         return {}
-    curve, hover = _NAMES.get(log.format, ("MOT_THST_EXPO or THR_MDL_FAC", "MOT_THST_HOVER or MPC_THR_HOVER"))
+    curve, hover = _NAMES.get(log.format, ("thrust curve, share of the square", "hover throttle"))
     out, t, x = {}, log.t[on], x[on]
     e = log.parameters.get("MOT_THST_EXPO", log.parameters.get("THR_MDL_FAC", 0.0))
     found = _slope(log, t, x)
@@ -60,7 +61,9 @@ def thrust_curve(log: FlightLog) -> dict[str, Constant]:
     blocks = [b.mean() for b in np.array_split(lift, BATCHES)]
     known = out.get(curve)
     turned = 0.0 if known is None else known.half * float(np.mean(x - x**2))
-    out[hover] = Constant(float(lift.mean()), float(np.hypot(half_width(blocks), turned)), "1")
+    half = float(np.hypot(half_width(blocks), turned))
+    if half < _WIDE * lift.mean():
+        out[hover] = Constant(float(lift.mean()), half, "1")
     return out
 
 
