@@ -214,7 +214,7 @@ FIGURES = (
            LEFT_OUT, _errors("unseen", "median_abs", *_ALL)),
     Figure(BELIEVE, "What is printed is the solver's own number: # / # / # / # % from stations", LEFT_OUT,
            _errors("as_drawn", "median_abs", *_ALL)),
-    Figure(BELIEVE, "% from stations, # / # / # / # % from labels", LABELS, _of_labels),
+    Figure(BELIEVE, "# / # / # / # % from labels", LABELS, _of_labels),
     Figure(BELIEVE, "Its 90 % intervals held the truth in # of #", "reports/proof/proof.json",
            lambda d: [_score("90 % interval holds the truth", k)(d)[0] for k in ("hits", "n")]),
     Figure(BELIEVE, "nine of ten points are within # to # %", LEFT_OUT,
