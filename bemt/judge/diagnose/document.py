@@ -248,8 +248,9 @@ def explanation(d: Diagnosis) -> list[str]:
     speaks = d.found.probability.get(DOUBT, 0.0) > d.found.prior.get(DOUBT, 1.0)
     likelier = open_ and level and speaks and not doubted
     if likelier or doubted or decision.effects[:1] == (AnotherPropeller.id,):
-        lead = f"The loads are off the case ({off}): are diameter, pitch and blades its own? " if likelier else ""
-        lines.append(f"{lead}Nearest rotors: {other_rotor.nearest_rotors(d.problem)}.")
+        lead = f"The loads are off the case ({off}): are diameter, pitch and blades its own?" if likelier else ""
+        near = other_rotor.nearest_rotors(d.problem)
+        lines += [told] if (told := " ".join(filter(None, (lead, near and f"Nearest rotors: {near}.")))) else []
     if decision.verdict == "none":
         lines.append(f"Why: {decision.why}.")
         if max((abs(v) for v in level.values()), default=0.0) > _WORTH_SAYING:
