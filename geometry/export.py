@@ -131,12 +131,8 @@ def _rounded(value: Any) -> Any:
     return float(f"{float(value):.9g}") if isinstance(value, (float, np.floating)) else value
 
 
-def _surfaces(model: MeshModel) -> list[dict[str, object]]:
-    return [_surface(part, name) for part in model.parts for name in part.names]
-
-
-def _surface(part: Mesh, name: str) -> dict[str, object]:
-    return {"name": name, "triangles": len(part.part(name)), "area_m2": part.area(name)}
+def _surface(part: Mesh, name: str, written: NDArray[np.int64]) -> dict[str, object]:
+    return {"name": name, "triangles": len(written), "area_m2": part.area(name)}
 
 
 def _stl(vertices: Array, faces: NDArray[np.int64], title: str) -> str:
@@ -172,13 +168,14 @@ def _weld(vertices: Array, faces: NDArray[np.int64]) -> tuple[Array, NDArray[np.
 def _meshes(model: MeshModel, work: Path, name: str, kind: str, unit: str) -> Written:
     """STL with one named solid per surface, or OBJ with one group per surface."""
     pieces = [f"# unit: {unit}\n# {FRAME}\n"] if kind == "obj" else []
-    count = 0
+    count, surfaces = 0, []
     for part in model.parts:
         vertices, faces, group = _clean(part, UNITS[unit])
         if kind == "obj":
             pieces.append(("v %.9g %.9g %.9g\n" * len(vertices)) % tuple(vertices.ravel().tolist()))
         for k, surface in enumerate(part.names):
             chosen = faces[group == k]
+            surfaces.append(_surface(part, surface, chosen))
             if kind == "obj":
                 rows = ("f %d %d %d\n" * len(chosen)) % tuple((chosen + 1 + count).ravel().tolist())
                 pieces.append(f"g {surface}\n{rows}")
@@ -190,7 +187,7 @@ def _meshes(model: MeshModel, work: Path, name: str, kind: str, unit: str) -> Wr
     expected = sum(part.volume for part in model.parts)
     _check_file([path], UNITS[unit], expected, len(model.parts))
     closed = True if kind == "obj" or sum(len(part.names) for part in model.parts) == 1 else "the named solids together"
-    return Written(path.name, kind, unit, closed, _surfaces(model))
+    return Written(path.name, kind, unit, closed, surfaces)
 
 
 _THREE_MF = {
@@ -207,9 +204,10 @@ _THREE_MF = {
 
 def _three_mf(model: MeshModel, work: Path, name: str) -> Written:
     """3MF, always in millimetres: one object per solid (3MF Consortium, core specification 1.3; not checked)."""
-    pieces, items = [], []
+    pieces, items, surfaces = [], [], []
     for number, part in enumerate(model.parts, 1):
-        vertices, faces, _ = _clean(part, UNITS["mm"])
+        vertices, faces, group = _clean(part, UNITS["mm"])
+        surfaces += [_surface(part, name, faces[group == k]) for k, name in enumerate(part.names)]
         rows = ('<vertex x="%.9g" y="%.9g" z="%.9g"/>' * len(vertices)) % tuple(vertices.ravel().tolist())
         triangles = ('<triangle v1="%d" v2="%d" v3="%d"/>' * len(faces)) % tuple(faces.ravel().tolist())
         pieces.append(
@@ -226,7 +224,7 @@ def _three_mf(model: MeshModel, work: Path, name: str) -> Written:
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as packed:
         for entry, content in (_THREE_MF | {"3D/3dmodel.model": text}).items():
             packed.writestr(zipfile.ZipInfo(entry), content, zipfile.ZIP_DEFLATED)  # no date: equal rotors, equal files
-    return Written(path.name, "3mf", "mm", True, _surfaces(model))
+    return Written(path.name, "3mf", "mm", True, surfaces)
 
 
 def _openfoam(model: MeshModel, work: Path) -> list[Written]:
@@ -237,10 +235,11 @@ def _openfoam(model: MeshModel, work: Path) -> list[Written]:
         vertices, faces, group = _clean(part, 1.0)
         for k, surface in enumerate(part.names):
             path = folder / f"{surface}.stl"
-            path.write_text(_stl(vertices, faces[group == k], surface), encoding="ascii")
+            chosen = faces[group == k]
+            path.write_text(_stl(vertices, chosen, surface), encoding="ascii")
             paths.append(path)
-            at = path.relative_to(work).as_posix()
-            out.append(Written(at, "openfoam", "m", "together with the other surfaces", [_surface(part, surface)]))
+            at, closed = path.relative_to(work).as_posix(), "together with the other surfaces"
+            out.append(Written(at, "openfoam", "m", closed, [_surface(part, surface, chosen)]))
     _check_file(paths, 1.0, sum(part.volume for part in model.parts), len(model.parts))
     return out
 

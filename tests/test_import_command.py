@@ -373,3 +373,30 @@ def test_a_torque_coefficient_ten_times_too_large_is_said(tmp_path: Path, headin
     said = {f.id: f for f in check(import_file(tmp_path / "k.csv"))}
     assert ("coefficient_tenfold" in said) == found
     assert not found or "multiply by 0.1" in said["coefficient_tenfold"].correction
+
+
+@pytest.mark.parametrize(
+    ("head", "sign", "step"),
+    [
+        ("Gas in %;Schub in Gramm;Leistung in Watt;Spannung in Volt", 1, "bemt compare a.csv ANOTHER_RUN "),
+        ("Gas in %;Schub in Gramm;Leistung in Watt;Drehzahl pro Minute", 1, "bemt diagnose a.csv --case CASE "),
+        ("Gas in %;Schub in Gramm;Leistung in Watt;RPM", -1, "bemt diagnose a.csv --case CASE --sign thrust=-1 "),
+        ("Gas in %;Schub in Lot;Leistung in Watt;Spannung in Volt", 1, "bemt import a.csv --unit 'Schub in Lot'=UNIT "),
+    ],
+)
+def test_the_next_step_is_one_that_goes_on(
+    head: str, sign: int, step: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Units in words; no speed, a load of the other sign, a unit that nobody knows: what it prints takes it further."""
+    monkeypatch.chdir(tmp_path)
+    rows = [
+        f"{10 * k};{sign * 12 * k * k};{2 * k**3};{15.6 - 0.01 * k if 'Volt' in head else 1000 * k}"
+        for k in range(3, 11)
+    ]
+    Path("a.csv").write_text("\n".join([head, *rows, ""]), encoding="utf-8")
+    assert main(["import", "a.csv"]) == 0
+    assert f"Next: {step}" in capsys.readouterr().out
+    if "Lot" in head:
+        Path("b.csv").write_text("\n".join([head, *rows[1:], ""]), encoding="utf-8")
+        assert main(["compare", "a.csv", "b.csv"]) == 2
+        assert "a.csv: got no load and no speed" in capsys.readouterr().err

@@ -183,6 +183,8 @@ def test_the_propeller_that_most_people_print_is_one_body(nozzle_mm, least_mm, w
     made = export_case(Job(case, printed=request), tmp_path, ["stl"])
     assert made["checks_m"]["min_thickness"] >= 1e-3 * least_mm
     vertices, triangles, unit = read_solid(tmp_path / f"{case.name}.stl")
+    assert made["files"][0]["surfaces"][0]["triangles"] == len(triangles)
+    assert made["printed"]["hub_by_ratio_mm"] == pytest.approx(1e3 * 0.15 * case.diameter_m)
     body = Mesh(vertices, triangles, np.zeros(len(triangles), np.int64), ("x",))
     check_closed(body, "stl", bodies=1)
     blade = case.rotor().blade

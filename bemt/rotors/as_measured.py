@@ -31,7 +31,7 @@ FACTOR = 3.0
 FAR = 4.0
 """Standard deviations off what was known of the rotor from which on a reading is doubted [1]."""
 MOST_PASSES = 4
-"""What the rotor is found with, rest and bias, goes by the loads of the rotor found: taken anew so often at most [1]."""
+"""Rest and bias go by the loads of the rotor that they help to find: taken anew so often at most [1]."""
 MOST_POINTS = 40
 """Points beyond this number are averaged with their neighbours in (J, rpm) [1]."""
 
@@ -158,7 +158,7 @@ def as_measured(
 
 
 def _off_by(prior: Prior, at: Sensed, off: Array, noise: Array, mine: NDArray[np.bool_]) -> Array:
-    """``off``, readings less the case (2 P,), over their standard deviations, given the readings not `mine`; of these."""
+    """``off`` of `mine`, readings less the case (2 P,), over its standard deviation given the others."""
     T = at.T.transpose(0, 2, 1).reshape(off.size, -1)
     S = noise + T @ prior.cov @ T.T * float(prior.weights @ prior.sizes**2)
     off, rest = off - T @ prior.mean, ~mine & np.isfinite(off)

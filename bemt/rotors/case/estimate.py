@@ -240,7 +240,7 @@ class RotorEstimate(Dataset):
         if g.source:
             notes.append(f"as measured: {g.source}")
         if g.known_from == "label" and g.series is None and (open_ := fresh.open_kind(g.label, g.blades)):
-            notes.append(open_)
+            notes += [open_, self._by_kind()]
         if g.pitch_in > SWAPPED * g.diameter_in:
             notes.append(f"! a label is diameter x pitch: is it {g.pitch_in:g}x{g.diameter_in:g}?")
         notes += [f"! {flag}" for flag in counted([list(flags) for flags in self.flags])]
@@ -250,6 +250,16 @@ class RotorEstimate(Dataset):
         if more and g.known_from == "label":
             notes.append(f"for narrower bands give {' or '.join(more)}")
         return "\n".join([read, text_table(head, cells, left=()), *notes]) + "\n"
+
+    def _by_kind(self) -> str:
+        """Thrust of the first row as each kind of blade that an ending tells."""
+        g, at = self.given, [self.columns[k][:1] for k in ("rpm", "airspeed_m_s", "angle_deg")]
+        shown = []
+        for end in fresh.OPEN_ENDINGS:
+            case = case_of_label(f"{g.label} {end}", g.blades, g.chord_mm, g.measured_pitch_in, None, g.density_kg_m3)
+            found = propagate(case, at[0], at[1], angle_deg=at[2], bands=False).points
+            shown.append(f"{end} {number_text(found.thrust_N[0], 3)}")
+        return f"with one, T at {speed_text(at[0][0])} rev/min: {', '.join(shown)} N"
 
     def __str__(self) -> str:
         return in_words(self.text)

@@ -119,6 +119,10 @@ def read_label(label: str, blades: int | None = None) -> Designation:
     return replace(found, blades=blades or found.blades or 2)
 
 
+OPEN_ENDINGS = tuple(sorted(letters.upper() for letters, kind in ENDINGS.items() if kind in CLASS_CHORD))
+"""Endings of a label that tell the kind of blade."""
+
+
 def open_kind(label: str, blades: int | None = None) -> str:
     """What a label leaves open that states no kind of blade, and which series were measured in its size; else empty.
 
@@ -130,9 +134,8 @@ def open_kind(label: str, blades: int | None = None) -> str:
         return ""
     same = {FAMILIES.get(one.family, one.family) for one in records().values() if one.has_size(told)}
     kin = sorted({name for name in same if told.maker.casefold() in name.casefold()} or same)
-    endings = ", ".join(sorted(letters.upper() for letters, kind in ENDINGS.items() if kind in CLASS_CHORD))
     measured = f"; measured in this size (--series): {', '.join(kin)}" if kin else ""
-    return f"no ending ({endings}): the kind of blade is open and changes the answer{measured}"
+    return f"no ending ({', '.join(OPEN_ENDINGS)}): the kind of blade is open and changes the answer{measured}"
 
 
 def case_name(text: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -103,6 +103,7 @@ class AsPrinted(Documented):
     """How a blade was made for a printer."""
 
     least_thickness_mm: float
+    hub_by_ratio_mm: float | None = field(default=None, kw_only=True)  # Hub of which the case states but a ratio
 
 
 class Widened(AsPrinted):
@@ -142,7 +143,8 @@ def shapes(case: Case, options: Options | None, request: Print | None) -> list[S
     rotors = [("", rotor)] if request.hand is None else [made[h] for h in made if request.hand in (h, "both")]
     options, out = Options(printed=_printed(request, duct is not None)), []
     for end, rotor in rotors:
-        told = AsPrinted(thickness_mm(request))
+        guessed = request.hub_diameter_mm is None and case.file.rotor.hub_ratio is not None
+        told = AsPrinted(thickness_mm(request), hub_by_ratio_mm=2e3 * rotor.Rhub if guessed else None)
         try:
             model = build(rotor, None, options)
         except GeometryError as error:
@@ -153,7 +155,7 @@ def shapes(case: Case, options: Options | None, request: Print | None) -> list[S
                 model = build(wider, None, options)
             except GeometryError as still:
                 raise GeometryError([(*f[:3], _fine(rotor, case, request)) for f in still.faults]) from None
-            told = _changes(case, rotor, wider, told.least_thickness_mm)
+            told = _changes(case, rotor, wider, told)
             rotor = wider
         # A slicer takes each named solid for a part, and blade and hub alone are open.
         whole = replace(model.rotor, group=np.zeros_like(model.rotor.group), names=("rotor",))
@@ -183,7 +185,7 @@ def _fine(rotor: Rotor, case: Case, request: Print) -> str:
     return "A wider blade, or a larger rotor"
 
 
-def _changes(case: Case, before: Rotor, after: Rotor, least_mm: float) -> Widened:
+def _changes(case: Case, before: Rotor, after: Rotor, told: AsPrinted) -> Widened:
     """What the wider tip is, and what it costs at the case's point, in per cent of thrust and torque."""
     from bemt.rotors.case.prepare import prepare_case
 
@@ -197,7 +199,8 @@ def _changes(case: Case, before: Rotor, after: Rotor, least_mm: float) -> Widene
         found = replace(model, rotor=rotor).solve(case.rpm, case.airspeed_m_s, case.air())
         loads.append((float(found.thrust_N[0]), float(found.torque_Nm[0])))
     thrust, torque = (100.0 * (b / a - 1.0) for a, b in zip(*loads, strict=True))
-    return Widened(least_mm, (1e3 * float(old[-1]), 1e3 * float(new[-1])), where, thrust, torque)
+    tip = (1e3 * float(old[-1]), 1e3 * float(new[-1]))
+    return Widened(told.least_thickness_mm, tip, where, thrust, torque, hub_by_ratio_mm=told.hub_by_ratio_mm)
 
 
 def printed_text(printed: AsPrinted) -> list[str]:
@@ -206,6 +209,8 @@ def printed_text(printed: AsPrinted) -> list[str]:
         f"printed with a least thickness of {printed.least_thickness_mm:g} mm",
         "strength and highest speed are not judged: bemt design keeps a blade within the strength of its material",
     ]
+    if (hub := printed.hub_by_ratio_mm) is not None:
+        lines.insert(1, f"its hub of {hub:.3g} mm follows from hub_ratio in the case; yours: --hub-diameter-mm")
     if isinstance(printed, Widened):
         old, new = printed.tip_chord_mm
         finer = f". A finer nozzle keeps it: --nozzle-mm {FINE_MM:g}" if old >= TIP_CHORD * LINES * FINE_MM else ""

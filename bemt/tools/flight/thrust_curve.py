@@ -23,7 +23,8 @@ from bemt.tools.flight.log import FlightLog
 from bemt.tools.flight.repeat import BATCHES, block_means, flight_scatter, half_width, jackknifed, regressed
 
 _BLOCK_S, _WIDE, _SCATTER = 0.25, 0.5, 0.14
-"""Length of a mean [s]; half width of e, and share of the hover throttle, from which it is not given; standard deviation of e between flights [1]."""
+"""Length of a mean [s]; half width of e, and of the hover throttle over it, from which it is not given; standard
+deviation of e between flights [1]."""
 _NAMES = {"ArduPilot DataFlash": ("MOT_THST_EXPO", "MOT_THST_HOVER"), "PX4 ULog": ("THR_MDL_FAC", "MPC_THR_HOVER")}
 
 
