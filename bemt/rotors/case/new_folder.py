@@ -14,6 +14,7 @@ from bemt.base.packed import part_of
 from bemt.base.tables import write_atomic
 from bemt.base.units import INCH
 from bemt.data.readers import load_text
+from bemt.data.readers.stations import outermost
 from bemt.data.readers.uiuc_names import find_family
 from bemt.rotors.case import Case, fresh, from_solid, load_case
 from bemt.rotors.case.motor import full_speed
@@ -97,6 +98,11 @@ def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str], list
             if isinstance(item.nominal, int | float)]  # fmt: skip
     assumed = [f"assumed, with ranges in case.toml: {', '.join(told)}"] if wanted.fan and told else []
     unused = re.findall(r"^# (column .*)$", files["case.toml"].decode(), re.M)
+    if wanted.stations:
+        whence = "" if wanted.diameter_mm is not None else f" of the label {wanted.label}"
+        reach = outermost(Path(wanted.stations))
+        at = f", outermost station at {1e3 * reach[0]:.5g} mm" if reach else ""
+        assumed = [f"taken: diameter {1e3 * case.diameter_m:.5g} mm{whence}{at}, {case.get('rotor.blades')} blades"]
     bare = wanted.label and not (wanted.stations or wanted.scan or wanted.fan or wanted.series)
     kind = [line for line in [fresh.open_kind(str(wanted.label), wanted.blades)] if line] if bare else []
     return folder, sorted(files), [*assumed, *kind, *notes, *unused]
@@ -200,6 +206,9 @@ def _size_faults(w: Wanted) -> Iterator[Fault]:
     if w.diameter_mm is None:
         if w.stations is not None and fresh.label_or_name(w.label, None, Path(w.stations))[1]:
             expected, hint = "the diameter, with --stations", "Or the propeller's label"
+            if reach := outermost(Path(w.stations)):
+                size = 2.0 * reach[0] / (INCH if reach[1] == "in" else 1e-3)
+                hint = f"Is the outermost station the tip? --diameter-{reach[1]} {size:.5g}. {hint}"
             yield Fault("", "--diameter-mm", "nothing", expected, hint)
         return
     sized = w.stations is not None or w.fan
