@@ -186,6 +186,8 @@ _ONLY = {  # channel: words that the heading of the only column in its unit may 
 }  # fmt: skip
 _AIR_UNITS = (("airspeed", "m_s", "J"), ("pressure", "Pa", "density_kg_m3"), ("temperature", "K", "density_kg_m3"))
 """Quantities of the air, their units, and the channels that make up for them."""
+
+
 def only_ones(build: Builder) -> None:
     """A load that no column is headed for is that of the only column in its unit whose words leave it open.
 

@@ -30,6 +30,7 @@ from bemt.judge.compare.drive_laws import (
 from bemt.judge.compare.matched import (
     DRIVE,
     LOADS,
+    OVER_COMMAND,
     POWER_OF_SPEED,
     WITHOUT_SPEED,
     MatchedChannel,
