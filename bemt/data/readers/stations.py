@@ -12,7 +12,6 @@ import numpy as np
 
 from bemt.base import units
 from bemt.base.arrays import Array
-from bemt.base.errors import InputError
 from bemt.base.tables import number_of
 from bemt.data.readers import SourceText, load_text, number
 from bemt.data.readers._words import english, plain
@@ -92,7 +91,7 @@ def _of_hundred(unit: str) -> float:
     return 0.01 if "%" in unit else 1.0
 
 
-def _column(at: int, text: str, R: float) -> _Column | None:
+def column_of(at: int, text: str, R: float) -> _Column | None:
     """What a heading stands for; None for another. An angle without a unit is in degrees, or refused as too small."""
     bare = re.sub(r"[ _]over[ _]", "/", " ".join(text.split()))
     ways = [*splits(bare), *([(tail[1], "in")] if (tail := re.fullmatch(r"(.+) in", bare)) else [])]
@@ -125,20 +124,6 @@ def _hint(headings: Sequence[str], lacking: Sequence[str]) -> str:
     return _TWIST if "beta" in lacking and any("twist" in plain(h).split() for h in headings) else ""
 
 
-def outermost(path: Path) -> tuple[float, str] | None:
-    """Outermost radius of a table of stations [m] and its unit; None where it has none in a length."""
-    try:
-        table = split_table(load_text(path), header=True, most_misfits=1.0)
-    except InputError:
-        return None
-    for j, text in enumerate(table.headings):
-        if (column := _column(j, text, 1.0)) and column.name == "r" and not column.share:
-            values = table.numbers(j, decimal_mark(table))[0] * column.scale
-            unit = "in" if abs(column.scale / units.INCH - 1.0) < 1e-9 else "mm"
-            return (float(np.nanmax(values)), unit) if np.isfinite(values).any() else None
-    return None
-
-
 def read_stations(path: Path, R: float) -> BladeStations:
     """Stations of a table for a tip radius [m], other columns are named; faults carry line and column.
 
@@ -151,14 +136,16 @@ def read_stations(path: Path, R: float) -> BladeStations:
         source.refuse("", "0 stations", "two or more")
     table = split_table(source, header=True, most_misfits=1.0)
     top = table.headings_line
-    found = [column for j, text in enumerate(table.headings) if (column := _column(j, text, R))]
+    found = [column for j, text in enumerate(table.headings) if (column := column_of(j, text, R))]
     told = []
     if not any(
         column.name in ("beta", "pitch") for column in found
     ):  # beside r and chord one angle is that of the blade
         bare = [(j, h) for j, h in enumerate(table.headings) if _ANGLE.search(plain(h))]
         angles = (
-            [c for j, h in bare if (c := _column(j, _ANGLE.sub("blade angle", plain(h)), R))] if len(bare) == 1 else []
+            [c for j, h in bare if (c := column_of(j, _ANGLE.sub("blade angle", plain(h)), R))]
+            if len(bare) == 1
+            else []
         )
         told = [f"column {bare[0][1]!r} read as beta_deg, the angle to the plane of rotation" for _ in angles]
         found += angles
