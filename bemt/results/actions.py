@@ -136,15 +136,12 @@ def report(
     from pathlib import Path as File
 
     from bemt.base.checkout import commit as checked_out
-    from bemt.base.errors import Fault, InputError
     from bemt.base.given import path_text, paths_text
     from bemt.results.report import HTML_NAME, write
     from bemt.rotors.case.words import sorted_out
 
     given, own = sorted_out(paths_text("cases", cases), paths_text("recording", recording))
     given, known = given or ["."], paths_text("reference", reference)
-    if known and not own:
-        raise InputError(Fault("", "reference", "no recording", "one to set beside it"))
     about = {"title": title, "author": author, "date": datetime.date.today().isoformat() if date is None else date}
     revision = checked_out(File(given[0])) if commit is None else commit
     about |= {"revision": f"commit {revision}"} if revision else {}

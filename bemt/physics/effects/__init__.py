@@ -51,18 +51,11 @@ def places() -> dict[str, int]:
     return {name: k for k, name in enumerate(catalogue())}
 
 
-def source_of(effect: type[Effect] | Effect) -> str:
-    """Law of an effect and where it comes from, in one line: the notes of its docstring; of one that is on, its form.
-
-    A paragraph of the notes that has forms ends with the last of them.
-    """
-    cls, form = (effect, "") if isinstance(effect, type) else (type(effect), getattr(effect, "form", ""))
+def source_of(cls: type[Effect], form: str = "") -> str:
+    """Law of an effect, of one form or all, and where it comes from: the notes of its docstring, in one line."""
     text = inspect.cleandoc(cls.__doc__ or "").partition("Notes\n-----\n")[2]
-    said = []
-    for paragraph in text.split("\n\n"):
-        lead, *forms = re.split(r'(?=``form = ")', " ".join(paragraph.split()))
-        said += [lead, *(f for f in forms if f.startswith(f'``form = "{form}'))]
-    return re.sub(r":\w+:`([^`]+)`|``([^`]+)``", r"`\1\2`", " ".join(" ".join(said).split()))
+    text = re.sub(rf'``form =\s"(?!{form}).*?(?=``form =|\n\n|\Z)', "", text, flags=re.DOTALL)
+    return re.sub(r":\w+:`([^`]+)`|``([^`]+)``", r"`\1\2`", " ".join(text.split()))
 
 
 def standard() -> tuple[Effect, ...]:

@@ -19,12 +19,10 @@ class Reynolds(Effect):
     -----
     ``form = "table"``: section tables over Reynolds number, their change from Re0 = 1e5 times ``amount`` (Selig et al.
     1989, Airfoils at Low Speeds, SoarTech 8; not checked: such tables disagree by that much at low Re). ``form =
-    "power"`` keeps the table at Re0 and scales drag by (Re0/Re)^exponent and attached lift by (Re/Re0)^lift_exponent:
-    drag exponents are 0.5 for a laminar, 0.2 for a turbulent flat plate (Schlichting 1979, Boundary-Layer Theory, eq.
-    7.34 and 21.12, exponents there), up to 0.6 with laminar bubbles (Hoerner 1965, Fluid-Dynamic Drag, ch. 6; not
-    checked), which cost lift too (range declared).
-
-    Off: Re0 everywhere.
+    "power"`` keeps the table at Re0 and scales drag by (Re0/Re)^exponent and
+    attached lift by (Re/Re0)^lift_exponent: drag exponents are 0.5 for a laminar, 0.2 for a turbulent flat plate
+    (Schlichting 1979, Boundary-Layer Theory, eq. 7.34 and 21.12, exponents there), up to 0.6 with laminar bubbles
+    (Hoerner 1965, Fluid-Dynamic Drag, ch. 6; not checked), which cost lift too (range declared). Off: Re0 everywhere.
     """
 
     form: str = "table"

@@ -74,6 +74,8 @@ def write(
     from bemt.results.report.gather import gather
 
     folder = Path(out)
+    if references and not recordings:
+        raise InputError(Fault("--reference", "", "no recording", "one to set beside it, --recording"))
     if recordings:
         from bemt.results.report.gather import diagnose_into
 

@@ -98,7 +98,7 @@ def sources(case: Case) -> Sources:
         Source("method", "program", BEMT.format(__version__)),
         Source("method", "blade element momentum", METHOD),
         *([Source("method", "duct", DUCT)] if case.ducted else []),
-        *(Source("effect", e.id, source_of(e) or "declared by this project") for e in effects),
+        *(Source("effect", e.id, source_of(type(e), getattr(e, "form", "")) or "declared by this project") for e in effects),
         *_sections(case),
         *_bands(case),
         Source("comparison", "k1k2", K1K2),
