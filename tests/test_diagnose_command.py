@@ -184,6 +184,19 @@ def test_nothing_of_a_file_goes_unmentioned(tmp_path: Path, change: dict[str, ob
     assert any(words in note for note in notes), notes
 
 
+@pytest.mark.parametrize("heading", ["v Kanal (m/s)", "flow (m/s)", "Anströmung [m/s]"])
+def test_a_column_that_may_be_the_airspeed_is_asked_about_at_every_door(
+    tmp_path: Path, heading: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    n, V = np.repeat([4000.0, 6000.0, 8000.0], 3), np.tile([0.0, 4.0, 8.0], 3)
+    table = {"rpm": n, heading: V, "thrust_N": 1e-7 * n**2 * (1.0 - 0.08 * V * 6000.0 / n), "torque_Nm": 2e-9 * n**2}
+    a, b = (_table(tmp_path / f"{name}.csv", table) for name in "ab")
+    for words in (["import", a], ["diagnose", a, "--case", str(CASES / "prop_8x5")], ["compare", a, b]):
+        assert main(words) == (0 if words[0] == "import" else 2)
+        told = "".join(capsys.readouterr())
+        assert "s it the airspeed? --column airspeed=" in told and "misread" not in told
+
+
 def test_loads_beside_coefficients_are_used_under_any_of_their_names(tmp_path: Path) -> None:
     columns = {"rpm": RPM, "CT": 0.05, "F (N)": LOADS["thrust_N"], "torque_Nm": LOADS["torque_Nm"]}
     made = load(_table(tmp_path / "log.csv", columns), case())

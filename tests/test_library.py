@@ -278,6 +278,8 @@ def test_what_an_answer_stands_on_follows_the_case(tmp_path: Path) -> None:
     assert "swirl" in names and "tip_gap" not in names and len(names) == len(set(names))
     assert "swirl" not in [s.name for s in bemt.cite(p.replaced({"model.effects_off": ["swirl"]}))]
     assert all(len(s.source) > 10 for s in bemt.cite(p))
+    text = bemt.cite(p).text
+    assert 'form = "table"' in text and 'form = "power"' not in text  # only what is on
     fan = bemt.cite(str(Path(__file__).parents[1] / "cases" / "ds30"))
     assert "tip_gap" in [s.name for s in fan] and any(s.kind == "data" and "Cahill" in s.source for s in fan)
 

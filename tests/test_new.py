@@ -24,6 +24,14 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+def test_a_station_off_the_line_between_its_neighbours_is_refused(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / "odd.csv").write_text(STATIONS.replace("0.75,0.16,15", "0.75,0.16,51"))
+    assert main(["new", "odd", "--stations", "odd.csv", "--diameter-mm", "254"]) == 2
+    assert "odd.csv: 4:3: got 51; expected about 16" in capsys.readouterr().err
+
+
 def test_a_folder_that_exists_is_said_to(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "notes.txt").write_text("mine")

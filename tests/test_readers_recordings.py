@@ -461,6 +461,19 @@ def test_decimal_commas_are_read_where_they_can_be_nothing_else(write: Write) ->
     assert all(np.array_equal(commas[k], v) for k, v in points.values.items())
 
 
+def test_decimal_commas_in_quotes_are_read_and_one_point_among_them_is_named(write: Write) -> None:
+    rows = [("3504", "3,517"), ("4511", "5,910"), ("5500", "8,825"), ("6500", "12,40"), ("7000", "14,38")]
+    quoted = "\n".join(['"rpm","thrust [N]"', *(f'"{n}","{T}"' for n, T in rows)])
+    assert importers.read(write(quoted))["thrust_N"].tolist() == [3.517, 5.91, 8.825, 12.4, 14.38]
+    with pytest.raises(InputError, match="'8.825' at 4:2 among decimal commas"):
+        importers.read(write(quoted.replace("8,825", "8.825")))
+
+
+def test_a_temperature_and_a_pressure_are_headed_as_a_thrust_is() -> None:
+    names = ("thrust N", "temp C", "pressure hPa", "thrust C", "current A")
+    assert [heading(name).unit_name for name in names] == ["N", "K", "Pa", "", ""]
+
+
 def test_doubtful_commas_are_refused_with_a_hint(write: Write) -> None:
     text = plain_text(";").replace(".", ",").replace("ok", "0.5")  # a number with a point beside them
     with pytest.raises(InputError, match='State decimal = ","') as caught:

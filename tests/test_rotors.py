@@ -366,6 +366,19 @@ def test_condition_is_exact_for_a_linear_solver() -> None:
     assert found.log_evidence == pytest.approx(evidence, rel=1e-9)
 
 
+def test_condition_ends_where_it_stands_still_though_the_solver_is_rough() -> None:
+    """A step within the tolerance may lose what the tolerance is worth."""
+    random = np.random.default_rng(76)
+    T, size, rate = random.standard_normal((12, K)), random.uniform(0.2, 1.5), random.uniform(0.5, 3)
+    wave = random.standard_normal(12)
+
+    def solve(z: np.ndarray) -> np.ndarray:
+        return np.asarray(T @ z + size * wave * np.sin(rate * z[0]))
+
+    y = solve(np.array([1.0, 0.3, -0.2, 0.1])) + 0.3 * random.standard_normal(12)
+    assert condition(solve, Prior(np.zeros(K), np.eye(K), np.ones(1), np.ones(1)), y, np.eye(12)).converged
+
+
 def test_condition_leaves_exact_numbers_and_missing_rows_alone() -> None:
     T = np.random.default_rng(4).normal(size=(8, K))
     cov = np.eye(K)

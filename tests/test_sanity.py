@@ -368,6 +368,17 @@ def test_one_mistyped_reading_of_a_table_is_found_and_its_neighbours_are_not(fac
     assert found.rows == (rows - 2,) and f"line {rows}" in found.evidence
 
 
+@pytest.mark.parametrize("factor", [0.1, 2.0, 10.0])
+def test_one_mistyped_reading_of_a_tunnel_is_found_and_a_windmill_is_none(factor: float) -> None:
+    n, J = np.repeat([3500.0, 4500.0, 5500.0], 7), np.tile(np.linspace(0.0, 0.75, 7), 3)  # no thrust at J 0.65
+    noise = 1.0 + 0.01 * np.random.default_rng(2).standard_normal(21)
+    table = {"rpm": n, "airspeed_m_s": J * n / 60.0 * 0.3, "thrust_N": 1e-7 * n**2 * (0.65 - J) * (1.0 + J) * noise}
+    assert not said(check(recording(table)), "misread")
+    table["thrust_N"][9] *= factor
+    (found,) = said(check(recording(table)), "misread")
+    assert found.rows == (9,) and "m/s" in found.evidence
+
+
 def test_time_going_backwards() -> None:
     values = stand()
     values["time_s"][8:] -= 20.0

@@ -21,6 +21,7 @@ __all__ = ["import_"]
 @action(
     "Recordings", "import log.csv", words=("files",), command="import", shown=True,
     common=("case", "rpm", "sheet", "unit", "column", "sign", "zones", "out"),
+    elsewhere=dict.fromkeys(("--air", "--air-a"), "Air that no column has: diagnose --density-kg-m3, compare --air-a."),
 )  # fmt: skip
 def import_(
     files: File | Sequence[File], *, format: str | None = None, sheet: str | None = None,  # noqa: A002

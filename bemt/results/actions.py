@@ -85,12 +85,12 @@ def sweep(
 
 @action(
     "Propellers and fans", "report cases/ --out reports", words=("cases",), shown=True,
-    common=("out", "recording", "title", "author"),
+    common=("out", "recording", "reference", "title", "author"),
 )  # fmt: skip
 def report(
-    cases: Path | Sequence[Path] = (), *, out: Path, recording: Path | Sequence[Path] = (), title: str = "",
-    author: str = "", date: str | None = None, commit: str | None = None,
-    progress: Callable[[str], None] | None = None,
+    cases: Path | Sequence[Path] = (), *, out: Path, recording: Path | Sequence[Path] = (),
+    reference: Path | Sequence[Path] = (), title: str = "", author: str = "", date: str | None = None,
+    commit: str | None = None, progress: Callable[[str], None] | None = None,
 ) -> Told:  # fmt: skip
     """Write the validation report of cases: one HTML file that opens from disk, and a summary in Markdown.
 
@@ -101,7 +101,9 @@ def report(
     out : path
         Folder for the report and its sweep.
     recording : path or sequence of paths
-        Recordings of the one case: diagnosed, and shown on its page inside the prediction.
+        Recordings of the one case: diagnosed together, and shown on its page inside the prediction.
+    reference : path or sequence of paths
+        Recordings from the same stand without the cause, as in a diagnosis.
     title : str
         Title; that of the case if there is one, else Validation report.
     author : str
@@ -139,11 +141,11 @@ def report(
     from bemt.rotors.case.words import sorted_out
 
     given, own = sorted_out(paths_text("cases", cases), paths_text("recording", recording))
-    given = given or ["."]
+    given, known = given or ["."], paths_text("reference", reference)
     about = {"title": title, "author": author, "date": datetime.date.today().isoformat() if date is None else date}
     revision = checked_out(File(given[0])) if commit is None else commit
     about |= {"revision": f"commit {revision}"} if revision else {}
-    book, files = write(given, path_text("out", out), progress or (lambda line: None), about, own)
+    book, files = write(given, path_text("out", out), progress or (lambda line: None), about, own, known)
     count = len(book.cases)
     size = f": {files[0].stat().st_size / 1e6:.2f} MB, {count} case{'s' * (count != 1)}"
     lines = [f"{file}{size if file.name == HTML_NAME else ''}" for file in files]

@@ -55,12 +55,13 @@ def condition(
 
     Notes
     -----
-    DIAGNOSIS section 7.  With L L^T = noise, A = L^-1 T and the prior whitened, z+ = (I + A^T A)^-1 A^T L^-1 (y - f0),
+    DIAGNOSIS section 7. With L L^T = noise, A = L^-1 T and the prior whitened, z+ = (I + A^T A)^-1 A^T L^-1 (y - f0),
     f0 = f(c) - T (c - prior mean); a step is accepted by the misfit plus the log-determinant at every size of the heavy
-    tail, with what `tolerance` in every number is worth, else halved.  The heavy tail is a mixture of sizes: the posterior weights take the place of
-    s^2 = (nu s0^2 + x^2)/(nu + 1).  Readings that lie further off than the largest of the noise's usual sizes bears are
-    believed less, by Birge's ratio (R. T. Birge, Physical Review 40, 1932, p. 207, not checked): a run that fits no
-    rotor moves none.  The ratio is of readings to each other, so one alone has none: it is this rotor's.
+    tail, with what `tolerance` in every number is worth, else halved. The heavy tail is a mixture of sizes: the
+    posterior weights take the place of s^2 = (nu s0^2 + x^2)/(nu + 1). Readings that lie further off than the largest
+    of the noise's usual sizes bears are believed less, by Birge's ratio (R. T. Birge, Physical Review 40, 1932, p. 207,
+    not checked): a run that fits no rotor moves none. The ratio is of readings to each other, so one alone has none: it
+    is this rotor's.
     """
     z = np.array(prior.mean, dtype=float)
     f = np.asarray(solve(z), dtype=float)

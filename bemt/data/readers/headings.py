@@ -58,7 +58,8 @@ _THRUSTS = re.compile(
 _GOES: dict[str, tuple[str, ...]] = {  # what a suffix may be: T_A is rotor A's thrust, not a current
     "thrust": ("force",), "lift": ("force",), "torque": ("torque",), "power": ("power",), "rpm": ("angular_speed",),
     "voltage": ("voltage",), "current": ("current",), "T": ("force", "temperature", "time"), "F": ("force",),
-    "Q": ("torque",), "M": ("torque",), "P": ("power", "pressure", "length"), "I": ("current",), "U": ("voltage",),
+    "Q": ("torque",), "M": ("torque",), "P": ("power", "pressure", "length"), "p": ("pressure",),
+    "I": ("current",), "U": ("voltage",),
     "V": ("voltage", "speed"), "n": ("angular_speed",), "D": ("length",), "R": ("length",), "r": ("length",),
 }  # fmt: skip
 _SEPARATORS = (r"\s+[-–—]\s+", r"\s*,\s*", r"\s+in\s+", r"\s*/\s*", r"\s+")

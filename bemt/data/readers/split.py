@@ -285,7 +285,7 @@ def decimal_mark(table: SplitTable) -> str:
 
 
 def odd_mark(table: SplitTable) -> str:
-    """Numbers with a decimal point among many more with a decimal comma, and where they are; "" where there are none."""
+    """Numbers with a decimal point among many more with a decimal comma, and where they are; "" for none."""
     commas, points = _marks(table)
     if len(points) * 4 > len(commas):
         return ""

@@ -35,6 +35,9 @@ _TIPS = {"r": 1.0, "rtip": 1.0, "r tip": 1.0, "radius": 1.0, "d": 2.0, "diameter
 """What lengths are shares of, in tip radii."""
 _TWIST = "Rename it to beta_deg if it is the angle to the plane of rotation; twist may count from elsewhere"
 _NO_HEADINGS = "Add a line of headings, such as r_mm,chord_mm,beta_deg"
+LONE_DEG, LONE_TIMES = 20.0, 4.0
+"""Angle [deg], and times the chord, by which no station lies off the line between its neighbours: 235 blades of UIUC,
+APC and others reach 8 deg and 2.4 times."""
 THICKNESSES = (0.01, 0.5)
 """Thicknesses that a case takes, of the chord."""
 
@@ -88,7 +91,7 @@ def _of_hundred(unit: str) -> float:
     return 0.01 if "%" in unit else 1.0
 
 
-def _column(at: int, text: str, R: float) -> _Column | None:
+def column_of(at: int, text: str, R: float) -> _Column | None:
     """What a heading stands for; None for another. An angle without a unit is in degrees, or refused as too small."""
     bare = re.sub(r"[ _]over[ _]", "/", " ".join(text.split()))
     ways = [*splits(bare), *([(tail[1], "in")] if (tail := re.fullmatch(r"(.+) in", bare)) else [])]
@@ -133,14 +136,16 @@ def read_stations(path: Path, R: float) -> BladeStations:
         source.refuse("", "0 stations", "two or more")
     table = split_table(source, header=True, most_misfits=1.0)
     top = table.headings_line
-    found = [column for j, text in enumerate(table.headings) if (column := _column(j, text, R))]
+    found = [column for j, text in enumerate(table.headings) if (column := column_of(j, text, R))]
     told = []
     if not any(
         column.name in ("beta", "pitch") for column in found
     ):  # beside r and chord one angle is that of the blade
         bare = [(j, h) for j, h in enumerate(table.headings) if _ANGLE.search(plain(h))]
         angles = (
-            [c for j, h in bare if (c := _column(j, _ANGLE.sub("blade angle", plain(h)), R))] if len(bare) == 1 else []
+            [c for j, h in bare if (c := column_of(j, _ANGLE.sub("blade angle", plain(h)), R))]
+            if len(bare) == 1
+            else []
         )
         told = [f"column {bare[0][1]!r} read as beta_deg, the angle to the plane of rotation" for _ in angles]
         found += angles
@@ -172,7 +177,8 @@ def read_stations(path: Path, R: float) -> BladeStations:
     if not source.faults and len(table) < 2:
         source.add("", number_of(len(table), "station"), "two or more")
     source.check()
-    if np.all(np.diff(columns[0]) < 0.0):  # from the tip inwards
+    inwards = bool(np.all(np.diff(columns[0]) < 0.0))
+    if inwards:  # from the tip
         columns = [v[::-1] for v in columns]
         thick = None if thick is None else thick[::-1]
     elif back := np.flatnonzero(np.diff(columns[0]) <= 0.0).tolist():
@@ -183,6 +189,13 @@ def read_stations(path: Path, R: float) -> BladeStations:
     if wanted[2] == "pitch":
         beta = np.degrees(np.arctan2(beta, 2.0 * np.pi * x))
     _limits(source, places, (x, chord, beta), R)
+    for place, values, far in ((places[1], chord, np.log(LONE_TIMES)), (places[2], beta, LONE_DEG)):
+        if not source.faults and (lone := _lone(x, np.log(values) if place.name == "chord" else values, far)):
+            row = len(table) - 1 - lone[0] if inwards else lone[0]
+            usual = np.exp(lone[1]) if place.name == "chord" else lone[1]
+            usual = np.tan(np.radians(usual)) * 2.0 * np.pi * x[lone[0]] if place.name == "pitch" else usual
+            expected = f"about {usual / place.scale:.3g}, as its neighbours have it"
+            source.add(f"{table.lines[row]}:{place.at + 1}", table.cell(row, place.at), expected, "Mistyped?")
     source.check()
     if thick is not None and not thicknesses[0].share:
         thick = thick / chord
@@ -206,6 +219,16 @@ def _thickness(table: SplitTable, columns: Sequence[_Column], decimal: str) -> t
         return values, []
     why = "two of thickness" if len(columns) > 1 else "not a number at every station"
     return None, [f"column {c.heading!r} not used: {why}" for c in columns]
+
+
+def _lone(x: Array, values: Array, far: float) -> tuple[int, float] | None:
+    """Station that is furthest off the line between its neighbours, and that line's value there; None within `far`."""
+    if x.size < 3:
+        return None
+    share = (x[1:-1] - x[:-2]) / (x[2:] - x[:-2])
+    line = values[:-2] * (1.0 - share) + values[2:] * share
+    worst = int(np.argmax(np.abs(values[1:-1] - line)))
+    return (worst + 1, float(line[worst])) if abs(values[worst + 1] - line[worst]) > far else None
 
 
 def _other_unit(place: _Column, value: float, low: float, high: float, R: float) -> str:

@@ -168,7 +168,7 @@ def splits(text: str) -> Iterator[tuple[str, str]]:
         for mark in (r"\s+(?:in|en|em)\s+", r"\s+[-\u2013\u2014:]\s+", r"\s*[,;:]\s*", r"\s*/\s*", r"[\s_-]+"):
             for found in re.finditer(mark, text):
                 unit = text[found.end() :]
-                if not (mark.startswith("[") and found[0] != "_" and unit in ("A", "C", "F", "in", "a", "c", "f")):
+                if not (mark.startswith("[") and found[0] != "_" and unit in ("A", "in", "a")):
                     yield text[: found.start()], unit
     yield text, ""
 

@@ -151,10 +151,9 @@ def misread(facts: Facts) -> Iterator[Finding]:
             rows = np.flatnonzero(good & np.isfinite(flow) & np.isfinite(v))
             times = lone(rpm[rows], v[rows] * float(np.sign(np.median(v[rows]))), flow[rows])
         for i, off in zip(rows[times != 1.0].tolist(), times[times != 1.0].tolist(), strict=True):
-            text = (
-                f"{v[i]:.4g} in line {facts.lines[i]} is {off:.3g} times what the others give at {rpm[i]:.0f} rev/min"
-            )
-            text += "" if flow is None else f" and J {flow[i]:.2g}" if V is None else f" and {V[i]:.3g} m/s"
+            at = f"{rpm[i]:.0f} rev/min"
+            at += "" if flow is None else f" and J {flow[i]:.2g}" if V is None else f" and {V[i]:.3g} m/s"
+            text = f"{v[i]:.4g} in line {facts.lines[i]} is {off:.3g} times what the others give at {at}"
             fix = "mistyped, or a loose contact? Measure it again; `diagnose` and `compare` leave it out"
             yield Finding("misread", facts.named(name), text, fix, (i,), "warning")
 

@@ -225,7 +225,7 @@ def with_headings(imported: Dataset, name: str) -> None:
 
 
 def speed_in_doubt(imported: Dataset, path: str) -> None:
-    """Refuse a file whose speed, or airspeed, cannot be read: it must not be left out, nor replaced by that of a case."""
+    """Refuse a file whose speed, or airspeed, cannot be read: it must not be left out, nor be that of a case."""
     told = named(imported).values
     if (doubt := asks(imported).get("airspeed")) and "J" not in told:
         name, got, fix = doubt

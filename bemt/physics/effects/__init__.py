@@ -51,9 +51,10 @@ def places() -> dict[str, int]:
     return {name: k for k, name in enumerate(catalogue())}
 
 
-def source_of(cls: type[Effect]) -> str:
-    """Law of an effect and where it comes from: the notes of its docstring, in one line."""
+def source_of(cls: type[Effect], form: str = "") -> str:
+    """Law of an effect, of one form or all, and where it comes from: the notes of its docstring, in one line."""
     text = inspect.cleandoc(cls.__doc__ or "").partition("Notes\n-----\n")[2]
+    text = re.sub(rf'``form =\s"(?!{form}).*?(?=``form =|\n\n|\Z)', "", text, flags=re.DOTALL)
     return re.sub(r":\w+:`([^`]+)`|``([^`]+)``", r"`\1\2`", " ".join(text.split()))
 
 

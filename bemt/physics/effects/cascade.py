@@ -41,17 +41,18 @@ class Cascade(Effect):
     "carter"``: Weinig's slope of flat plates; the zero-lift angle makes a circular arc at zero incidence leave with
     Carter's deviation, m theta sqrt(s/c) with m = 0.23 + 0.1 beta_2 / 50 deg (Carter 1950, ARC R&M 2804; as quoted in
     Cohen, Rogers and Saravanamuttoo, Gas Turbine Theory, sec. 5.9; not checked), in rows of solidity above 0.6, faded
-    in from 0.3. ``zero_lift`` is the share of the row's shift of the zero-lift angle; 0 keeps that of the isolated
-    section. At the solidity of a two-blade propeller (below 0.1) K differs from 1 by less than 1 %.
+    in from 0.3.
 
-    Losses of compressor rows are faded in over the same range: drag is at least that of Lieblein's wake momentum
-    thickness theta/c = 0.004 / (1 - 1.17 ln D_eq), D_eq = cos(b2) / cos(b1) (1.12 + 0.61 cos^2(b1) / sigma (tan(b1) -
-    tan(b2))) (Lieblein 1959, J. Basic Eng. 81:387; not checked). A ducted row also has secondary losses, 0.018 cl^2
-    (Howell 1945, Proc. IMechE 153:441; as quoted in Cohen, Rogers and Saravanamuttoo; not checked against the paper).
-    Howell's annulus loss, 0.020 s/h with spacing s and blade height h, is friction of both walls expressed as drag of
-    the blades. It is left out: the outer wall stands still and brakes the stream, not the shaft, and the friction of
-    both is in the duct's balance of pressure already (:mod:`bemt.physics.bem.duct`). Counted again, at half of its
-    size, it raises the torque of four wide blades in nozzle 19A by 7 to 40 %.
+    ``zero_lift`` is the share of the row's shift of the zero-lift angle; 0 keeps that of the isolated section. At the
+    solidity of a two-blade propeller (below 0.1) K differs from 1 by less than 1 %. Losses of compressor rows are faded
+    in over the same range: drag is at least that of Lieblein's wake momentum thickness theta/c = 0.004 / (1 - 1.17 ln
+    D_eq), D_eq = cos(b2) / cos(b1) (1.12 + 0.61 cos^2(b1) / sigma (tan(b1) - tan(b2))) (Lieblein 1959, J. Basic Eng.
+    81:387; not checked). A ducted row also has secondary losses, 0.018 cl^2 (Howell 1945, Proc. IMechE 153:441; as
+    quoted in Cohen, Rogers and Saravanamuttoo; not checked against the paper). Howell's annulus loss, 0.020 s/h with
+    spacing s and blade height h, is friction of both walls expressed as drag of the blades. It is left out: the outer
+    wall stands still and brakes the stream, not the shaft, and the friction of both is in the duct's balance of
+    pressure already (:mod:`bemt.physics.bem.duct`). Counted again, at half of its size, it raises the torque of four
+    wide blades in nozzle 19A by 7 to 40 %.
     """
 
     zero_lift: float = 1.0

@@ -24,11 +24,13 @@ class Compressibility(Effect):
     ``form = "prandtl_glauert"``: cl = cl_0 / sqrt(1 - M^2) (Glauert 1928, Proc. R. Soc. A 118:113). ``form =
     "karman_tsien"``: cp = cp_0 / (b + k cp_0), b = sqrt(1 - M^2), k = M^2 / (2 (1 + b)) (von Karman 1941, Journal of
     the Aeronautical Sciences 8:337; Tsien 1939, Journal of the Aeronautical Sciences 6:399), on both sides of a section
-    whose mean pressures are -2 t/c (thin ellipse) -+ cl/2. Either holds up to the lift-divergence Mach number, set 0.04
-    above Korn's drag divergence M_dd = kappa - t/c - cl/10 (Mason 1990, AIAA 90-3029; not checked). Above it, lift
-    falls within 0.12 in M to ``shock_stall`` times the incompressible one and recovers between M = 1 and 1.1 to at most
-    1 or Ackeret's 4 / (2 pi sqrt(M^2 - 1)). The fall is a declared rule with the shape of published NACA 0012 tables,
-    not a fit to rotor data. Acts on the attached part; separated flow (beyond 40 deg) is not changed.
+    whose mean pressures are -2 t/c (thin ellipse) -+ cl/2.
+
+    Either holds up to the lift-divergence Mach number, set 0.04 above Korn's drag divergence M_dd = kappa - t/c - cl/10
+    (Mason 1990, AIAA 90-3029; not checked). Above it, lift falls within 0.12 in M to ``shock_stall`` times the
+    incompressible one and recovers between M = 1 and 1.1 to at most 1 or Ackeret's 4 / (2 pi sqrt(M^2 - 1)). The fall
+    is a declared rule with the shape of published NACA 0012 tables, not a fit to rotor data. Acts on the attached part;
+    separated flow (beyond 40 deg) is not changed.
     """
 
     amplitude: float = 1.0
@@ -38,7 +40,10 @@ class Compressibility(Effect):
 
     id = "compressibility"
     title = "compressibility (lift)"
-    sign = "thrust coefficient grows by about M^2/6 of the tip; depends on air temperature at the same speed, not on density"
+    sign = (
+        "thrust coefficient grows by about M^2/6 of the tip; depends on air temperature at the same speed, not on "
+        "density"
+    )
     words = {"form": FORMS}
     parameters = (
         Parameter("amplitude", "1", 0.6, 1.4, "1 is the published form; those differ by a fifth", 5, 0.0),

@@ -21,14 +21,14 @@ class GroundEffect(Effect):
     (V/v)^2) (Cheeseman and Bennett 1955, ARC R&M 3021). Constant power is v/v_inf = 1 - (R/4z)^2, and at equal thrust,
     as v_inf goes with the root of thrust, v/v_inf = (1 - (R/4z)^2)^(3/2). ``form = "hayden"``: induced power at equal
     thrust times 1 / (0.9926 + 0.0379 (2R/z)^2), a fit of flight tests (Hayden 1976, 32nd AHS Forum), fading in the same
-    way. Coefficients checked against public codes, not against the papers; the fading belongs to edgewise flow there
-    and is used for axial flow here. The rotor sees V - share v. A recorded ``wall_distance_m`` replaces z_over_R;
-    closer than R/2 counts as R/2.
+    way.
 
-    The wall also decelerates wind along the axis. Ahead of a disk of radius a, on its axis, a stream V is V (1 - (2/pi)
-    (acot(zeta) - zeta / (1 + zeta^2))), zeta = z/a (potential of a disk moving broadside on, Lamb 1932, Hydrodynamics,
-    art. 108, superposed on the stream; derived here from the potential). Used only if the wall distance is recorded;
-    ``plate_radius_over_R`` is a, and 0 leaves the wind unchanged.
+    Coefficients checked against public codes, not against the papers; the fading belongs to edgewise flow there and is
+    used for axial flow here. The rotor sees V - share v. A recorded ``wall_distance_m`` replaces z_over_R; closer than
+    R/2 counts as R/2. The wall also decelerates wind along the axis. Ahead of a disk of radius a, on its axis, a stream
+    V is V (1 - (2/pi) (acot(zeta) - zeta / (1 + zeta^2))), zeta = z/a (potential of a disk moving broadside on, Lamb
+    1932, Hydrodynamics, art. 108, superposed on the stream; derived here from the potential). Used only if the wall
+    distance is recorded; ``plate_radius_over_R`` is a, and 0 leaves the wind unchanged.
     """
 
     form: str = "cheeseman_bennett"

@@ -26,8 +26,10 @@ class PostStall(Effect):
     the stall point (Viterna and Janetzke 1982, NASA TM-82944; equation numbers not checked). They are linear in cd_max,
     so the change from the table's own drag at 90 deg is added and vanishes at the stall. ``form = "plate"``: beyond the
     stall the section becomes a separated flat plate within 10 deg, force normal to the chord, cl = cd_max sin a cos a
-    and cd = cd_max sin^2 a (Hoerner 1965, Fluid-Dynamic Drag, ch. 3; not checked). cd_max = 1.11 + 0.018 AR (Viterna
-    and Janetzke 1982) to 2.0 for an infinite plate. Off: post-stall data of the tables.
+    and cd = cd_max sin^2 a (Hoerner 1965, Fluid-Dynamic Drag, ch. 3; not checked).
+
+    cd_max = 1.11 + 0.018 AR (Viterna and Janetzke 1982) to 2.0 for an infinite plate. Off: post-stall data of the
+    tables.
     """
 
     form: str = "viterna"

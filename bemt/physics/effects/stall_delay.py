@@ -21,14 +21,16 @@ class StallDelay(Effect):
     -----
     ``form = "chaviaropoulos"``: weight = 2.2 (c/r) cos^4(beta), beta the blade angle, times coefficient / 3
     (Chaviaropoulos and Hansen 2000, J. Fluids Eng. 122:330; not checked). Its a = 2.2, h = 1, n = 4 come from
-    quasi-three-dimensional Navier-Stokes solutions. It acts further outboard than the other two. ``form =
-    "snel"``: weight = coefficient (c/r)^2, 3 in Snel, Houwink and Bosschers (1994), ECN-C--93-052, eq. 6.2. ``form =
+    quasi-three-dimensional Navier-Stokes solutions. It acts further outboard than the other two. ``form = "snel"``:
+    weight = coefficient (c/r)^2, 3 in Snel, Houwink and Bosschers (1994), ECN-C--93-052, eq. 6.2. ``form =
     "du_selig"``: weight = (1.6 (c/r)/0.1267 (1 - (c/r)^e) / (1 + (c/r)^e) - 1) / (2 pi), e = R/r, times coefficient / 3
     and not below zero (Du and Selig 1998, AIAA-98-0021, with a = b = d = 1 and Lambda = 1, the limit of a tip speed
-    well above the airspeed; c/r held at 0.75, declared). Checked against public codes, not against the reports. cl_pot
-    is the straight line through the zero-lift angle with the table's own slope. Faded out between 30 and 50 deg and
-    applied to positive stall only. What rotation adds is a force normal to the chord (Lindenburg 2003, ECN-C--03-025;
-    not checked against the report), so drag grows by ``normal`` times gain times tan(alpha).
+    well above the airspeed; c/r held at 0.75, declared).
+
+    Checked against public codes, not against the reports. cl_pot is the straight line through the zero-lift angle with
+    the table's own slope. Faded out between 30 and 50 deg and applied to positive stall only. What rotation adds is a
+    force normal to the chord (Lindenburg 2003, ECN-C--03-025; not checked against the report), so drag grows by
+    ``normal`` times gain times tan(alpha).
     """
 
     coefficient: float = 3.0

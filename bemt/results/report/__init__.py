@@ -61,12 +61,12 @@ def book_html(book: Book) -> str:
 
 def write(
     paths: Sequence[str | Path], out: str | Path, progress: Callable[[str], None],
-    about: Mapping[str, str] | None = None, recordings: Sequence[str] = (),
+    about: Mapping[str, str] | None = None, recordings: Sequence[str] = (), references: Sequence[str] = (),
 ) -> tuple[Book, tuple[Path, Path]]:  # fmt: skip
     """Sweep the cases into a folder and write the report beside; returns what it shows, and its two files.
 
     ``about`` holds title, author, date and revision for the head of the page, each as far as wanted.
-    ``recordings`` are runs of the one case: they are diagnosed first, and stand on its page.
+    ``recordings`` are runs of the one case: they are diagnosed first, beside ``references``, and stand on its page.
     """
     from bemt.base.tables import write_atomic
     from bemt.results.report.book import About
@@ -74,10 +74,12 @@ def write(
     from bemt.results.report.gather import gather
 
     folder = Path(out)
+    if references and not recordings:
+        raise InputError(Fault("--reference", "", "no recording", "one to set beside it, --recording"))
     if recordings:
         from bemt.results.report.gather import diagnose_into
 
-        diagnose_into(paths, recordings, folder, progress)
+        diagnose_into(paths, recordings, folder, progress, references)
     book = replace(gather(paths, folder, progress, recordings), about=About.from_document(about or {}))
     files = folder / HTML_NAME, folder / MARKDOWN_NAME
     try:

@@ -133,7 +133,7 @@ def plain_markdown(value: Any, limit: int = 500) -> str:
     ('a\\|b &lt;script&gt; \\[x\\](y)', 'see https:&#47;&#47;x.org, www&#46;y.org, me&#64;z.org')
     """
     text = " ".join("".join(c for c in str(value) if c.isprintable() or c.isspace()).split())
-    text = text if len(text) <= limit else text[: limit - 1] + "…"
+    text = text if len(text) <= limit else text[: limit - 1].rpartition(" ")[0] + " …"
     text = text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
     text = re.sub(r"([\\`*_{}\[\]#|!~])", r"\\\1", text)
     return re.sub(r"\bwww\.", "www&#46;", text.replace("://", ":&#47;&#47;").replace("@", "&#64;"), flags=re.IGNORECASE)

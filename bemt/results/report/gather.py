@@ -236,9 +236,10 @@ def attach_diagnoses(book: Book, out: Path) -> Book:
 
 
 def diagnose_into(
-    paths: Sequence[str | Path], recordings: Sequence[str], out: Path, progress: Callable[[str], None] | None = None
-) -> None:
-    """Diagnose recordings of the one case of a report into ``out/NAME/diagnosis``.
+    paths: Sequence[str | Path], recordings: Sequence[str], out: Path, progress: Callable[[str], None] | None = None,
+    references: Sequence[str] = (),
+) -> None:  # fmt: skip
+    """Diagnose recordings of the one case of a report, beside references, into ``out/NAME/diagnosis``.
 
     They are analysed together; too few readings are shown beside the model.
     """
@@ -253,10 +254,11 @@ def diagnose_into(
     if len(cases) != 1:
         fault = Fault("--recording", "", number_of(len(cases), "case"), "one case, the rotor that was recorded")
         raise InputError(fault)
-    found, records = load_all(list(recordings), [str(cases[0])])
+    found, records = load_all(list(recordings), [str(cases[0])], list(references))
     target = (out / found[0].name / "diagnosis").as_posix()
     folder.check(target, found)
     about = {"recordings": list(recordings), "cases": [c.name for c in found]}
+    about |= {"references": list(references)} if references else {}
     try:
         answer = diagnose(records, found, None, progress)
     except InputError as error:

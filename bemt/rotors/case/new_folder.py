@@ -5,15 +5,19 @@ from __future__ import annotations
 import re
 import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
 
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.packed import part_of
 from bemt.base.tables import write_atomic
 from bemt.base.units import INCH
 from bemt.data.readers import load_text
+from bemt.data.readers.split import decimal_mark, split_table
+from bemt.data.readers.stations import column_of
 from bemt.data.readers.uiuc_names import find_family
 from bemt.rotors.case import Case, fresh, from_solid, load_case
 from bemt.rotors.case.motor import full_speed
@@ -97,6 +101,11 @@ def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str], list
             if isinstance(item.nominal, int | float)]  # fmt: skip
     assumed = [f"assumed, with ranges in case.toml: {', '.join(told)}"] if wanted.fan and told else []
     unused = re.findall(r"^# (column .*)$", files["case.toml"].decode(), re.M)
+    if wanted.stations:
+        whence = "" if wanted.diameter_mm is not None else f" of the label {wanted.label}"
+        reach = _outermost(Path(wanted.stations))
+        at = f", outermost station at {1e3 * reach[0]:.5g} mm" if reach else ""
+        assumed = [f"taken: diameter {1e3 * case.diameter_m:.5g} mm{whence}{at}, {case.get('rotor.blades')} blades"]
     bare = wanted.label and not (wanted.stations or wanted.scan or wanted.fan or wanted.series)
     kind = [line for line in [fresh.open_kind(str(wanted.label), wanted.blades)] if line] if bare else []
     return folder, sorted(files), [*assumed, *kind, *notes, *unused]
@@ -195,11 +204,26 @@ def _faults(w: Wanted) -> list[Fault]:
     ]  # fmt: skip
 
 
+def _outermost(file: Path) -> tuple[float, str] | None:
+    """Outermost radius of a table of stations [m] and its unit; None where it has none in a length."""
+    with suppress(InputError):
+        table = split_table(load_text(file), header=True, most_misfits=1.0)
+        for j, text in enumerate(table.headings):
+            if (column := column_of(j, text, 1.0)) and column.name == "r" and not column.share:
+                r = table.numbers(j, decimal_mark(table))[0] * column.scale
+                unit = "in" if abs(column.scale / INCH - 1.0) < 1e-9 else "mm"
+                return (float(np.nanmax(r)), unit) if np.isfinite(r).any() else None
+    return None
+
+
 def _size_faults(w: Wanted) -> Iterator[Fault]:
     """Where a diameter is missing, out of range or said twice."""
     if w.diameter_mm is None:
         if w.stations is not None and fresh.label_or_name(w.label, None, Path(w.stations))[1]:
             expected, hint = "the diameter, with --stations", "Or the propeller's label"
+            if reach := _outermost(Path(w.stations)):
+                size = 2.0 * reach[0] / (INCH if reach[1] == "in" else 1e-3)
+                hint = f"Is the outermost station the tip? --diameter-{reach[1]} {size:.5g}. {hint}"
             yield Fault("", "--diameter-mm", "nothing", expected, hint)
         return
     sized = w.stations is not None or w.fan

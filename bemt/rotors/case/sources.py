@@ -94,11 +94,12 @@ def sources(case: Case) -> Sources:
     from bemt.rotors.case.prepare import prepare_case
 
     effects = [e for e in prepare_case(case).effects if case.ducted or e.id not in ("duct", "tip_gap")]
+    of = {e.id: source_of(type(e), getattr(e, "form", "")) or "declared by this project" for e in effects}
     found = Sources((
         Source("method", "program", BEMT.format(__version__)),
         Source("method", "blade element momentum", METHOD),
         *([Source("method", "duct", DUCT)] if case.ducted else []),
-        *(Source("effect", e.id, source_of(type(e)) or "declared by this project") for e in effects),
+        *(Source("effect", name, told) for name, told in of.items()),
         *_sections(case),
         *_bands(case),
         Source("comparison", "k1k2", K1K2),
