@@ -443,7 +443,7 @@ def _nearest(headings: Sequence[str], channels: Iterable[str] = ()) -> str:
         found = _speeds_meant(name, channels) if may_be_shaft_speed(name) else None
         if found is None:
             known = [q for q in meanings(name) if q in _MEANINGS]
-            found = known[:1] or difflib.get_close_matches(word, _MEANINGS, 1, 0.75)
+            found = known or difflib.get_close_matches(word, _MEANINGS, 1, 0.75)
         if found:
             near[name] = found
     if not near:
