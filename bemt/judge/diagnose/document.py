@@ -346,10 +346,10 @@ def _of_class(d: Diagnosis) -> str:
         return f"Two causes: {' and '.join(f'one of ({w})' if ' / ' in w else w for w in each)}"
     if len(titles) > _A_GROUP:
         return f"{len(titles)} causes look alike in these readings: {families(said.effects)}"
-    chance, lead = d.found.probability.get(said.leading, 0.0), said.leading.ids
-    most = " and ".join(_with_size(d, i) for i in said.leading) if lead and lead <= {*said.effects} else ""
-    most = f"; {most} is likeliest, probability {chance:.2f}" if most and chance >= _GUESS else ""
-    return f"The cause is {' or '.join(titles)}; these readings cannot distinguish them{most}"
+    chance, lead = d.found.probability.get(said.leading, 0.0), [i for i in said.leading if i in said.effects]
+    if len(lead) == 1:  # the likeliest, with its size
+        titles = [f"{_with_size(d, lead[0])} [{chance:.2f}]", *(_title(d, i) for i in said.effects if i not in lead)]
+    return f"The cause is {' or '.join(titles)}; these readings cannot distinguish them"
 
 
 def _off(d: Diagnosis) -> str:
