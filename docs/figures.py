@@ -169,6 +169,15 @@ CFD, FAN, CALIBRATION = "reports/cfd/summary.txt", "reports/ds30/result.json", "
 VOLUME = "reports/validation/uiuc_volume_{}/validation.json"
 
 
+LABELS = "reports/validation/labels/uiuc.txt"
+
+
+def _of_labels(text: str) -> list[float]:
+    """Median errors of labels in the order of ``_ALL``. [%]"""
+    rows = (("rest", "CT"), ("rest", "CP"), ("flight", "CT"), ("flight", "CP"))
+    return [float(re.findall(rf"^all +{motion} +{q} +\d+ +([\d.]+)", text, re.MULTILINE)[0]) for motion, q in rows]
+
+
 def _k1k2_low(d: Any) -> list[float]:
     """How low K1/K2 is in flight, first and last band of J/(P/D) below 0.8. [%]"""
     bands = d["scores"]["calibration"]["J/(P/D)"]
@@ -176,13 +185,14 @@ def _k1k2_low(d: Any) -> list[float]:
 
 
 FIGURES = (
-    Figure(README, "on # measured propellers, each family predicted without itself, the median error is # % of static "
-           "thrust and # % of static power. One in ten is off by more than # %", LEFT_OUT,
-           lambda d: [d["unseen"]["static"]["propellers"], *_errors("unseen", "median_abs", *_ALL[:2])(d),
-                      *_errors("unseen", "p90_abs", _ALL[0])(d)]),
+    Figure(README, "on # measured propellers the median error from blade stations is # % of static thrust and # % of "
+           "static power, one in ten off by more than # %", LEFT_OUT,
+           lambda d: [d["unseen"]["static"]["propellers"], *_errors("as_drawn", "median_abs", *_ALL[:2])(d),
+                      *_errors("as_drawn", "p90_abs", _ALL[0])(d)]),
+    Figure(README, "from labels # and # %", LABELS, lambda t: _of_labels(t)[:2]),
     Figure(README, "flight point of your own rotor bring flight to # %", LEFT_OUT,
            lambda d: [max(_errors("on_static_and_one", "median_abs", *_ALL[2:])(d))]),
-    Figure(README, "the 68 % band holds # to # % of those points", LEFT_OUT, _coverage("unseen", "68")),
+    Figure(README, "the 68 % band holds # to # % of left-out families' points", LEFT_OUT, _coverage("unseen", "68")),
     Figure(README, "# of # claims were right (# %)", PROOF,
            lambda t: [*claims(t)[:2], 100.0 * claims(t)[0] / claims(t)[1]]),
     Figure(README, "runs of # concealed tests", "reports/proof/proof.json", lambda d: [d["items"]]),
@@ -202,6 +212,11 @@ FIGURES = (
     Figure(BELIEVE, "and the 95 % intervals # to # %", LEFT_OUT, _coverage("unseen", "95")),
     Figure(BELIEVE, "Median errors are # % (static CT), # % (static CP), # % (CT in flight) and # % (CP in flight)",
            LEFT_OUT, _errors("unseen", "median_abs", *_ALL)),
+    Figure(BELIEVE, "What is printed is the solver's own number: # / # / # / # % from stations", LEFT_OUT,
+           _errors("as_drawn", "median_abs", *_ALL)),
+    Figure(BELIEVE, "# / # / # / # % from labels", LABELS, _of_labels),
+    Figure(BELIEVE, "Its 90 % intervals held the truth in # of #", "reports/proof/proof.json",
+           lambda d: [_score("90 % interval holds the truth", k)(d)[0] for k in ("hits", "n")]),
     Figure(BELIEVE, "nine of ten points are within # to # %", LEFT_OUT,
            lambda d: [f(_errors("unseen", "p90_abs", *_ALL)(d)) for f in (min, max)]),
     Figure(BELIEVE, "the 68 % intervals contain # to # % of the points of volume 2", LEFT_OUT,

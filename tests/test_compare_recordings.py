@@ -62,7 +62,8 @@ def stand(
 
 def written(path: Path, table: Mapping[str, Array]) -> str:
     rows = zip(*table.values(), strict=True)
-    path.write_text(",".join(table) + "\n" + "".join(",".join(f"{v:.8g}" for v in row) + "\n" for row in rows), "utf-8")
+    lines = (",".join(v if isinstance(v, str) else f"{v:.8g}" for v in row) + "\n" for row in rows)
+    path.write_text(",".join(table) + "\n" + "".join(lines), "utf-8")
     return str(path)
 
 
@@ -197,6 +198,33 @@ def test_without_a_speed_thrust_is_compared_at_equal_watts(tmp_path: Path, gain:
     assert (answer.verdict, answer.effects) == (verdict, ())
     assert thrust["kind"] == "at_power" and thrust["low95"] < gain < thrust["high95"] < 1.1 * thrust["low95"]
     assert "at equal electrical power" in answer.text and answer.picture()
+
+
+def test_without_a_speed_a_cut_blade_shows_at_equal_throttle(tmp_path: Path) -> None:
+    """At equal watts it gives as much thrust; at one throttle and voltage both are less, and no cause can be told."""
+    files = []
+    for name, seed, cut in (("a.csv", 1, 1.0), ("b.csv", 2, 0.94)):
+        table = stand(seed, scaled(thrust_N=cut**4, torque_Nm=cut**5))
+        watts = 1.4 * table.pop("torque_Nm") * table["rpm"] * np.pi / 30.0
+        throttle = 100.0 * table.pop("rpm") / 9000.0
+        same = {"Watt": watts, "Throttle (%)": throttle, "voltage_V": np.full(17, 12.0)}
+        files.append(written(tmp_path / name, table | same))
+    answer = compare(*files)
+    assert (answer.verdict, answer.effects) == ("insufficient", ()) and "at equal command" in answer.text
+
+
+def test_runs_of_cfd_with_other_set_ups_name_no_physics_and_no_cell(tmp_path: Path) -> None:
+    """What was computed with another turbulence model differs by that; one set-up leaves cells and pitot out."""
+    a, b = (stand(seed, scaled(torque_Nm=gain)) for seed, gain in ((1, 1.0), (2, 0.8)))
+    files = [
+        written(tmp_path / f"{k}.csv", {**t, "turbulence": [model] * 17})
+        for k, t, model in (("a", a, "SST"), ("b", b, "laminar"), ("c", b, "SST"))
+    ]
+    other, same = compare(files[0], files[1]), compare(files[0], files[2])
+    assert (other.verdict, other.effects) == ("insufficient", ())
+    assert "turbulence SST and laminar" in other.text and "one set-up" in other.document["next_measurement"]["text"]
+    assert not {"torque_gain", "torque_zero", "cross_talk"} & {r["effect"] for r in same.document["ranking"]}
+    assert "both days" not in same.text
 
 
 def test_recorded_density_is_the_cause_when_the_coefficients_agree(tmp_path: Path) -> None:

@@ -12,15 +12,19 @@ from bemt.judge.diagnose import chain
 from bemt.judge.diagnose.record import Record, from_series
 
 
-def run(seed: int, factor: float = 1.0, bow: float = 0.0) -> Record:
-    """A static run whose speed at a pulse width is a law of its own, times a factor."""
+def run(seed: int, factor: float = 1.0, bow: float = 0.0, volts: float = np.nan) -> Record:
+    """A static run whose speed at a pulse width is a law of its own, times a factor; the bus voltage it records."""
     given = points("static")
     pulse = np.linspace(0.0012, 0.0019, given["rpm"].size)
     share = (pulse - 0.001) / 0.001
     given["rpm"] = 24000.0 * factor * share / (1.0 + 0.25 * share + bow * share**2)
     given["rpm"] *= 1.0 + 0.002 * np.random.default_rng(seed).standard_normal(pulse.size)
     series = recording(case(), given, seed=seed)
-    return from_series(replace(series, values={**series.values, "pulse_width_s": pulse, "pwm_s": pulse}), case())
+    more = {"pulse_width_s": pulse, "pwm_s": pulse}
+    if np.isfinite(volts):
+        meter = 1.0 + 0.001 * np.random.default_rng(seed).standard_normal(share.size)
+        more["voltage_V"] = volts * (1.0 - 0.05 * share) * meter
+    return from_series(replace(series, values={**series.values, **more}), case())
 
 
 @pytest.mark.parametrize("seed", [4, pytest.param(5, marks=pytest.mark.slow)])
@@ -50,6 +54,16 @@ def test_another_supply_is_named_beside_a_reference(reference: Record, factor: f
     said = chain.diagnose([run(2, factor), reference], [case()])
     assert said.said.verdict in ("named", "class") and "supply_voltage" in said.said.effects
     assert said.systems["air"]["verdict"] == "none"
+
+
+def test_a_recorded_voltage_needs_no_look_and_no_guess() -> None:
+    """A voltmeter tells what lost voltage is worth: its shares are no parameters, and nobody is sent to read it."""
+    before = replace(run(1, volts=16.0), reference=True)
+    answer = chain.diagnose([run(2, 0.88, volts=14.0), before], [case()])
+    assert answer.said.verdict in ("named", "class") and "battery_sag" in answer.said.effects
+    assert not {"sag", "discharge"} & set(answer.parameters["battery_sag"])
+    assert answer.drive is not None and "supply_voltage" in answer.drive.absent
+    assert answer.next.kind != "look" and "voltage" not in answer.next.text
 
 
 def test_the_same_drive_is_no_cause(reference: Record) -> None:

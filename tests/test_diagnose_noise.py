@@ -112,6 +112,9 @@ def test_a_reference_finds_the_blade_whatever_the_case_says_of_it(off: float) ->
     np.testing.assert_allclose(problem.f0[mine], exact, atol=0.02 * exact.max())
     answer = chain.diagnose(records, [guess])
     assert answer.decision.effects == ("ground_effect",), answer.decision
+    # as much as the runs differ, whatever of the reference the blade leaves over
+    ratio = changed.values["thrust_N"] / plain.values["thrust_N"]
+    assert answer.where.channel == "thrust_N" and answer.where.ratio == pytest.approx(np.median(ratio) - 1.0, abs=0.02)
 
 
 def test_a_blade_that_runs_away_is_said_and_not_used() -> None:

@@ -139,21 +139,21 @@ def pair(**changed: Any) -> Any:
 
 
 def test_intervals_are_widened_by_their_factor_and_end_at_the_range() -> None:
-    told = {"untwist": {"tip_deg": Size(1.0, 0.8, 1.3, "deg")}, "rpm_scale": {"factor": Size(2.0, 2.0, 2.0, "1")}}
-    s = fit.scale_of("untwist", "tip_deg")
+    told = {"untwist": {"turn_deg": Size(1.0, 0.8, 1.3, "deg")}, "rpm_scale": {"factor": Size(2.0, 2.0, 2.0, "1")}}
+    s = fit.scale_of("untwist", "turn_deg")
     wide = fit.widened(told)
-    assert wide["untwist"]["tip_deg"].low == pytest.approx(1.0 - 0.2 * s)
-    assert wide["untwist"]["tip_deg"].high == pytest.approx(1.0 + 0.3 * s)
+    assert wide["untwist"]["turn_deg"].low == pytest.approx(1.0 - 0.2 * s)
+    assert wide["untwist"]["turn_deg"].high == pytest.approx(1.0 + 0.3 * s)
     assert wide["rpm_scale"] == told["rpm_scale"]  # a ratio has odds, no half-width
-    far = {"untwist": {"tip_deg": Size(4.9, 4.0, 5.0, "deg")}}
-    assert fit.widened(far)["untwist"]["tip_deg"].high == 5.0
+    far = {"untwist": {"turn_deg": Size(2.9, 2.0, 3.0, "deg")}}
+    assert fit.widened(far)["untwist"]["turn_deg"].high == 3.0
 
 
 def test_factors_hold_as_often_as_they_say() -> None:
     rng = np.random.default_rng(0)
     scores = np.abs(rng.standard_normal(400)) / 1.0
-    found = [Off("untwist.tip_deg", float(v)) for v in scores[:200]]
-    factor = calibrate(found, [])["parameters"]["untwist.tip_deg"]["scale"]
+    found = [Off("untwist.turn_deg", float(v)) for v in scores[:200]]
+    factor = calibrate(found, [])["parameters"]["untwist.turn_deg"]["scale"]
     assert np.mean(scores[200:] <= factor) == pytest.approx(0.9, abs=0.06)
 
 

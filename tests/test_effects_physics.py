@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from bemt.physics import effects
 from bemt.physics.air import Air
 from bemt.physics.bem import model as bem
 from bemt.physics.bem import solver
-from bemt.physics.effects import compressibility, drag_divergence, stall_delay
+from bemt.physics.effects import compressibility, drag_divergence, stall_delay, untwist
 from bemt.physics.effects.air_density import AirDensity
 from bemt.physics.effects.airspeed_offset import AirspeedOffset
 from bemt.physics.effects.base import Effect, Flow, Loads, Reading
@@ -575,11 +576,27 @@ def test_untwist_is_measured_at_the_hardest_point() -> None:
     flow = recorded([3000.0, 6000.0, 9000.0])
     share = Untwist().share(flow)
     np.testing.assert_allclose(share, [1 / 9, 4 / 9, 1.0])
-    CT, CT0 = (flow_loads(flow, *e)[0] / flow.rpm**2 for e in ((Untwist(2.0),), ()))
+    CT, CT0 = (flow_loads(flow, *e)[0] / flow.rpm**2 for e in ((Untwist(1.0),), ()))
     fall = 1.0 - CT / CT0
     assert np.all(fall > 0.0) and np.all(np.diff(fall) > 0.0)
     np.testing.assert_allclose(fall / fall[2], share, rtol=0.08)
     assert np.all(flow_loads(flow, Untwist(-1.0))[0] > flow_loads(flow)[0])
+
+
+@pytest.mark.parametrize("form", untwist.FORMS)
+def test_a_blade_twists_as_a_rod_that_is_free_at_its_tip(form: str) -> None:
+    """Beside the integrals of a rod of one section: moment as r^2, or, at one blade angle, the same everywhere."""
+    hub, n = 0.1, 400
+    r = hub + (1.0 - hub) * (np.arange(n) + 0.5) / n
+    same = np.ones(n)
+    thin, beta = 0.1 * same, 0.3 * same
+    bake = SimpleNamespace(r=r, dr=same * (1.0 - hub) / n, R=1.0, chord=thin, thickness=thin, beta=beta, level=1.0)
+    Untwist(2.0, form).blade(bake)
+    turn = np.degrees(0.3 - bake.beta)
+    x, s = r - hub, r**4 - hub**4
+    exact = x - s / 4.0 if form == "aerodynamic" else x - x**2 / (2.0 * (1.0 - hub))
+    np.testing.assert_allclose(turn, 2.0 * exact / np.interp(0.75, r, exact), atol=0.02)
+    assert turn[-1] - turn[-2] < 0.02 * (turn[1] - turn[0]), "no moment at the tip"
 
 
 def test_gaps_of_a_recording_are_in_proportion_to_the_largest() -> None:

@@ -23,7 +23,6 @@ RARE = 0.02
 """Probability below which a size of the noise is too rare to be believed of a run [1]."""
 MOST_STEPS = 8
 """Tangents are taken so often at most [1]."""
-_SLACK = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +57,7 @@ def condition(
     -----
     DIAGNOSIS section 7.  With L L^T = noise, A = L^-1 T and the prior whitened, z+ = (I + A^T A)^-1 A^T L^-1 (y - f0),
     f0 = f(c) - T (c - prior mean); a step is accepted by the misfit plus the log-determinant at every size of the heavy
-    tail, else halved.  The heavy tail is a mixture of sizes: the posterior weights take the place of
+    tail, with what `tolerance` in every number is worth, else halved.  The heavy tail is a mixture of sizes: the posterior weights take the place of
     s^2 = (nu s0^2 + x^2)/(nu + 1).  Readings that lie further off than the largest of the noise's usual sizes bears are
     believed less, by Birge's ratio (R. T. Birge, Physical Review 40, 1932, p. 207, not checked): a run that fits no
     rotor moves none.  The ratio is of readings to each other, so one alone has none: it is this rotor's.
@@ -87,7 +86,7 @@ def condition(
             if not np.isfinite(T_new[kept]).all():
                 continue
             there = _linear(prior, white, tail, target, f_new[kept], T_new[kept], at)
-            if there.score >= here.score - _SLACK:
+            if there.score >= here.score - 0.5 * free.sum() * tolerance**2:  # what is within the tolerance
                 taken = True
                 break
         if not taken:

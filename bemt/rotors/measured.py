@@ -154,6 +154,9 @@ def table(rotors: list[MeasuredRotor]) -> str:
     """List for people: label, where it was measured, and how far its blade is from its drawing."""
     from bemt.base.tables import text_table
 
+    if not rotors:
+        makers = dict.fromkeys(FAMILIES.get(one.family, one.family) for one in records().values())
+        return f"None measured has all of these words. Makers and series: {', '.join(sorted(makers))}\n"
     head = ["label", "measured as", "CT at rest", "CP at rest", "blade angle", "u", "drag", "u"]
     rows = []
     for one in rotors:

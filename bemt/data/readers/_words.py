@@ -156,6 +156,12 @@ def english(text: str) -> list[str]:
     return out
 
 
+def of_others(quantity: str) -> set[str]:
+    """Words that other quantities have and this one has not."""
+    _, heads, harmless, _ = _HEADS[quantity]
+    return {w for _, own, more, _ in _HEADS.values() for w in own | more} - heads - harmless - NEUTRAL
+
+
 def quantities(words: Iterable[str]) -> list[tuple[str, str]]:
     """Quantities that words may name and their dimensions: all words must belong to one.
 

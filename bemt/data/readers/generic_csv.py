@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import os
 import re
-import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -21,8 +20,8 @@ from numpy.typing import NDArray
 from bemt.data.readers import head_text, load_text, number
 from bemt.data.readers._large import NumberTable, large_table
 from bemt.data.readers._words import NEUTRAL, english
-from bemt.data.readers.headings import USUAL, Heading, counts_electrical, heading, slug
-from bemt.data.readers.recording import Builder
+from bemt.data.readers.headings import USUAL, Heading, counts_electrical, heading, may_be, slug
+from bemt.data.readers.recording import Builder, plausible
 from bemt.data.readers.samples import Channel
 from bemt.data.readers.split import (
     SplitTable,
@@ -185,12 +184,17 @@ _ONLY = {  # channel: words that the heading of the only column in its unit may 
     "voltage_V": "voltage u v motor main power mean",
     "current_A": "current i motor main power mean",
 }  # fmt: skip
+_AIR_UNITS = (("airspeed", "m_s", "J"), ("pressure", "Pa", "density_kg_m3"), ("temperature", "K", "density_kg_m3"))
+"""Quantities of the air, their units, and the channels that make up for them."""
 
 
 def only_ones(build: Builder) -> None:
-    """A load that no column is headed for is that of the only column in its unit whose words leave it open."""
+    """A load that no column is headed for is that of the only column in its unit whose words leave it open.
+
+    Of the air, where a wrong guess is not seen, such a column is asked about.
+    """
     for name, words in _ONLY.items():
-        unit = name.rsplit("_", 1)[1]
+        quantity, unit = name.rsplit("_", 1)
         same = [k for k, c in build.channels.items() if c.unit == unit and k != "duct_thrust_N"]
         ours = [
             k for k in same if set(english(build.headings[k])) - {unit.lower()} <= set(words.split()) | NEUTRAL | _MARKS
@@ -199,13 +203,17 @@ def only_ones(build: Builder) -> None:
             continue
         if len(same) == 1:
             label = build.rename(ours[0], name)
-            build.warnings.append(f"{label!r} is taken for the {name.rsplit('_', 1)[0]}: the only column in {unit}")
+            build.warnings.append(f"{label!r} is taken for the {quantity}: the only column in {unit}")
         else:
-            quantity = name.rsplit("_", 1)[0]
-            shown = ", ".join(repr(build.headings[k]) for k in ours[:6])
-            most = max(ours, key=lambda k: np.nanmax(np.abs(build.channels[k].values), initial=0.0))
-            build.warnings.append(f"which of {shown} is the {quantity}? {build.headings[most]!r} is the largest")
-            build.asks.append(f"--column {quantity}={shlex.quote(build.headings[most])}")
+            shown, most = ", ".join(repr(build.headings[k]) for k in ours[:6]), build.ask(quantity, ours)
+            build.warnings.append(f"which of {shown} is the {quantity}? {most!r} is the largest")
+    told = {USUAL.get(k, k) for k in build.channels}
+    for quantity, unit, other in _AIR_UNITS if told & {"rpm", *_ONLY} else ():
+        name = f"{quantity}_{unit}"
+        ours = [k for k, c in build.channels.items() if c.unit == unit and may_be(quantity, build.headings[k])]
+        ours = [k for k in ours if plausible(name, build.channels[k].values)]
+        if ours and not {name, other} & told:
+            build.ask(quantity, ours)
 
 
 def electrical(build: Builder) -> None:

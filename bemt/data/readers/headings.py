@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from bemt.base import units
-from bemt.data.readers._words import english, plain, quantities
+from bemt.data.readers._words import english, of_others, plain, quantities
 from bemt.data.readers.unit_text import (
     FORCES,
     TWO_MEANINGS,
@@ -65,10 +65,8 @@ _SEPARATORS = (r"\s+[-–—]\s+", r"\s*,\s*", r"\s+in\s+", r"\s*/\s*", r"\s+")
 _SHAFT_LETTERS = {"n", "ω"}
 _SHAFT_WORDS = set("speed omega rotation rotational rev revs revolution revolutions rps rpm krpm".split())
 _SHAFT_PARTS = {"motor", "rotor", "shaft", "prop", "propeller", "fan"}
-_OTHER_SPEEDS = {
-    "air", "airspeed", "wind", "flow", "tip", "sound", "stream", "freestream", "tunnel", "flight", "ground", "vehicle",
-    "climb", "err", "error", "u", "std", "sd",
-}  # fmt: skip
+_NOT_OF_AIR = {"tip", "sound", "ground", "vehicle", "climb", "exit", "wake", "induced", "err", "error", "std", "sd"}
+_OTHER_SPEEDS = {"air", "airspeed", "wind", "flow", "stream", "freestream", "tunnel", "flight", "u"} | _NOT_OF_AIR
 """Words of a heading that make it a speed of rotation, and of other speeds or of an uncertainty."""
 _COMPONENT = re.compile(
     r"\b([xyz]|axial|radial|tangential|swirl)[-_ ](velocity|speed)\b|\b(velocity|speed)[-_ ]([xyz]|magnitude)\b",
@@ -236,6 +234,16 @@ def may_be_shaft_speed(text: str) -> bool:
     turning = words & _SHAFT_PARTS and words & {"hz", "freq", "frequency"}
     other = words & _OTHER_SPEEDS or _COMPONENT.search(text)
     return base in _SHAFT_LETTERS or bool((words & _SHAFT_WORDS or turning) and not other)
+
+
+def may_be(quantity: str, text: str) -> bool:
+    """Tell whether no word of a heading is one of another quantity; its unit is not looked at.
+
+    >>> may_be("airspeed", "v Kanal (m/s)"), may_be("airspeed", "tip speed (m/s)"), may_be("temperature", "ESC (C)")
+    (True, False, False)
+    """
+    _, words = _spoken(text)
+    return not words & (of_others(quantity) | _NOT_OF_AIR) and not _COMPONENT.search(text)
 
 
 def surely_shaft_speed(text: str) -> bool:

@@ -43,6 +43,7 @@ from bemt.data.readers.split import (
     SplitTable,
     column_numbers,
     decimal_mark,
+    odd_mark,
     some,
     split_table,
     with_unit,
@@ -85,6 +86,7 @@ class Builder:
     clocks: list[str] = field(default_factory=list)
     units_stated: set[str] = field(default_factory=set)
     asks: list[str] = field(default_factory=list)
+    asked: dict[str, str] = field(default_factory=dict)  # Channel that may be it, by quantity
     decimal: str = "."  # As `decimal_mark` gives it
 
     def __post_init__(self) -> None:
@@ -168,6 +170,13 @@ class Builder:
             if (values := self.at(name)) is not None:
                 self.flag(np.flatnonzero(spikes(values)), f"spike of {name}")
 
+    def ask(self, quantity: str, names: Sequence[str]) -> str:
+        """Ask whether the largest of some channels is this quantity; gives its heading."""
+        most = max(names, key=lambda k: np.nanmax(np.abs(self.channels[k].values), initial=0.0))
+        self.asked[quantity] = most
+        self.asks.append(f"--column {quantity}={shlex.quote(self.headings[most])}")
+        return self.headings[most]
+
     def free(self, name: str) -> str:
         """Name that no channel or text has yet."""
         k, out = 2, name
@@ -230,6 +239,7 @@ class Builder:
         if comma:
             got = f"{cells[comma[0]]!r} ({len(comma)} such cells of {label!r})"
             hint = 'State decimal = "," in a recording.toml in the same folder, or export with decimal points'
+            hint += f"; {odd}" if isinstance(self.table, SplitTable) and (odd := odd_mark(self.table)) else ""
             if all(_THOUSANDS.fullmatch(cells[i]) for i in comma):
                 hint = f"A comma between thousands? Export without. If not: {hint[0].lower()}{hint[1:]}"
             self.fault(f"{self.line(comma[0])}:{index + 1}", got, "a number with a decimal point", hint)
@@ -348,7 +358,7 @@ class Builder:
         if self.unitless:
             hint = "Name units in the headings or in a recording.toml" + _nearest(self.unitless, self.channels)
             self.warnings.append(f"no unit known, none assumed, for {some(self.unitless, 8)}. {hint}")
-        said = {**self.table.source.about, "declared": self.declared, **(provenance or {})}
+        said = {**self.table.source.about, "declared": self.declared, "asked": self.asked, **(provenance or {})}
         asked = _asked(self.unitless, self.channels)
         if asks := [*self.asks, *asked.values()]:
             file = Path(self.table.source.name)
@@ -379,6 +389,14 @@ _PLAUSIBLE: dict[str, tuple[float, float, str]] = {
     "pressure_Pa": (3e4, 1.2e5, "Pa, hPa or mbar?"), "thrust_N": (1e-4, 2e4, "gf, kgf or N?"),
     "torque_Nm": (1e-6, 5e3, "Nm, mNm or gf cm?"), "airspeed_m_s": (0.0, 340.0, "km/h?"),
 }  # fmt: skip
+
+
+def plausible(name: str, values: Array) -> bool:
+    """Whether a channel can be this one of the air, by its size and what it varies by."""
+    (low, high, _), v = _PLAUSIBLE[name], values[np.isfinite(values)]
+    if name == "temperature_K":
+        high = min(HOTTEST_AIR, v.min(initial=np.inf) + MOST_AIR_VARIES)
+    return bool(v.any() and np.all((v >= low) & (v <= high)))
 
 
 def slip(ratio: float) -> str:

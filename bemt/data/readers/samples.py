@@ -85,6 +85,8 @@ LONE, LONE_SDS, LONE_SD = 1.5, 8.0, 0.03
 """Factor, and robust standard deviations of at least so much, by which a single reading is off the others. [1]"""
 FEWEST_OF_CURVE, MOST_OF_CURVE, SAME_SPEED = 5, 400, 0.02
 """Readings that make a curve, those of no table of points, and the share by which equal speeds differ. [1]"""
+FEWEST_IN_FLOW, SMALL_OFF = 10, 0.2
+"""Readings that make a curve over an airspeed too, and the share of its top that a single one may be off by. [1]"""
 MOST_RPM_PER_V = 8000.0
 """Speed over supply voltage that no usual motor reaches. [(rev/min)/V]"""
 STICKS = ("airspeed_m_s", "thrust_N", "torque_Nm")  # readings of a table that `stuck` judges
@@ -173,30 +175,52 @@ def _far(v: Array, a: int, b: int, spread: float) -> NDArray[np.bool_]:
     return np.maximum(part - hi, lo - part) > np.maximum(TIMES * (hi - lo), share * spread)
 
 
-def lone(speed: Array, load: Array) -> Array:
+def lone(speed: Array, load: Array, flow: Array | None = None) -> Array:
     """Times that single readings of a load are what a smooth curve of the others gives, (N,); 1 where nothing is odd.
 
     The curve is a power of the speed by the median of all slopes (Theil and Sen; Sen, Journal of the American
-    Statistical Association 63, 1968, p. 1379, not checked). Beyond the other speeds nothing is judged.
+    Statistical Association 63, 1968, p. 1379, not checked); in a ``flow``, airspeed over speed or as good, a parabola
+    over that too, by least absolute residuals. Beyond the others nothing is judged.
 
     >>> lone(np.array([5.7, 5.7, 6.1, 6.8, 7.4]), np.array([350.0, 1350.0, 420.0, 500.0, 590.0])).round(1)
     array([1. , 3.6, 1. , 1. , 1. ])
+    >>> n, J = np.full(12, 5000.0), np.tile(np.linspace(0.0, 0.5, 6), 2)
+    >>> lone(n, n**2 * (1.0 - J) * np.where(np.arange(12) == 3, 10.0, 1.0), J).round(1)[2:5]
+    array([ 1., 10.,  1.])
     """
     times = np.ones(speed.size)
-    if not FEWEST_OF_CURVE <= speed.size <= MOST_OF_CURVE:
+    if not (FEWEST_OF_CURVE if flow is None else FEWEST_IN_FLOW) <= speed.size <= MOST_OF_CURVE:
         return times
-    x, y = np.log(speed), np.log(load / speed**2)
-    dx, dy = x[:, None] - x, y[:, None] - y
-    apart = dx > SAME_SPEED
-    off = y - x * (np.median(dy[apart] / dx[apart]) if apart.any() else 0.0)
-    off = off - np.median(off)
-    odd = np.abs(off) > max(float(np.log(LONE)), LONE_SDS * max(1.4826 * float(np.median(np.abs(off))), LONE_SD))
+    x, y = np.log(speed), load / speed**2
+    dx, judged = x[:, None] - x, y > 0.0
+    if flow is None:
+        y = np.log(y)
+        dy, apart = y[:, None] - y, dx > SAME_SPEED
+        off = y - x * (np.median(dy[apart] / dx[apart]) if apart.any() else 0.0)
+    else:
+        curve = _least_absolute(np.column_stack([np.ones(x.size), flow, flow**2, x - x.mean()]), y)
+        off = np.log(np.where(judged & (curve > 0.0), y, np.nan) / np.where(curve > 0.0, curve, 1.0))
+        judged = np.abs(y - curve) > SMALL_OFF * curve.max()
+    off = off - np.nanmedian(off)
+    sd = max(1.4826 * float(np.nanmedian(np.abs(off))), LONE_SD)
+    odd = judged & (np.abs(off) > max(float(np.log(LONE)), LONE_SDS * sd))
     if np.count_nonzero(odd) > max(1, speed.size // 10):
         return times
     others = ~np.eye(speed.size, dtype=bool)
-    odd &= np.any(others & (dx > -SAME_SPEED), axis=1) & np.any(others & (dx < SAME_SPEED), axis=1)
+    for between, same in ((dx, SAME_SPEED), *(() if flow is None else ((flow[:, None] - flow, SAME_SPEED),))):
+        odd &= np.any(others & (between > -same), axis=1) & np.any(others & (between < same), axis=1)
     times[odd] = np.exp(off[odd])
     return times
+
+
+def _least_absolute(A: Array, y: Array) -> Array:
+    """Curve of the least sum of absolute residuals, by weights in turn, (N,)."""
+    weight, size = np.ones(y.size), 1e-3 * float(np.median(np.abs(y)))
+    for _ in range(30):
+        root = np.sqrt(weight)
+        curve = A @ np.linalg.lstsq(A * root[:, None], y * root, rcond=None)[0]
+        weight = 1.0 / np.maximum(np.abs(y - curve), size)
+    return np.asarray(curve)
 
 
 def against_load(speed: Array, load: Array) -> Array:

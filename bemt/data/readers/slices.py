@@ -23,7 +23,7 @@ from bemt.data.readers.headings import channel_of, heading
 from bemt.data.readers.split import decimal_mark, some, split_table
 
 LOADS = {"thrust": "force", "torque": "torque"}
-_RADIUS = re.compile(r"r|rad|radius|radial[_ ](position|coordinate|distance)", re.IGNORECASE)
+_RADIUS = re.compile(r"r|rad|radius|radial[_ ](position|coordinate|distance)|position\[r\]", re.IGNORECASE)
 _PER = re.compile(
     r"d(?P<letter>[TFQM])[ _]?[/_]?[ _]?dr|(?P<words>[a-z]+(?:[_ ]force)?)[_ ](?:per|over|/)[_ ](?:unit[_ ])?"
     r"(?:radius|length|span|metre|meter|m|r)",
@@ -51,6 +51,8 @@ def slice_heading(text: str) -> tuple[str, float] | str:
     (('r', 0.001), ('thrust', 1.0), ('torque', 1.0))
     >>> slice_heading("dQ/dr [N m/m]"), slice_heading("dQ/dr (N)"), slice_heading("chord [mm]")
     (('torque', 1.0), ('torque', 1.0), '')
+    >>> slice_heading("Position[r] (m)"), slice_heading("Thrust per Radius (N/m)")  # of STAR-CCM+
+    (('r', 1.0), ('thrust', 1.0))
     >>> slice_heading("dT/dr"), slice_heading("dT/dr [N]")
     ('no unit', "'N' is no force per length")
     """

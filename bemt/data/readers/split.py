@@ -262,19 +262,36 @@ def _below_a_block(lines: Sequence[str], usual: str) -> tuple[int, str] | None:
     return None
 
 
-def decimal_mark(table: SplitTable) -> str:
-    """Decimal mark of a table: a comma only where it can be nothing else; ``.,`` if commas stand between thousands."""
-    cells = {cell for row in table.rows for cell in row}
+def _marks(table: SplitTable) -> tuple[list[str], list[str]]:
+    """Distinct cells with commas, and numbers with points."""
+    cells = list(dict.fromkeys(cell for row in table.rows for cell in row))
     commas = [cell for cell in cells if re.fullmatch(r"[\d,eE+-]*\d,\d[\d,eE+-]*", cell)]
-    points = [cell for cell in cells if "." in cell and number(cell) is not None]
+    return commas, [cell for cell in cells if "." in cell and number(cell) is not None]
+
+
+def decimal_mark(table: SplitTable) -> str:
+    """Decimal mark of a table: a comma only where it can be nothing else; ``.,`` if commas stand between thousands.
+
+    Where commas part the cells, those inside one were quoted.
+    """
+    commas, points = _marks(table)
     thousands = all(_THOUSANDS.fullmatch(cell) for cell in commas)
     if commas and thousands and any(not re.fullmatch(r"[+-]?\d{1,3}\.\d{3}", cell) for cell in points):
         return ".,"
-    if table.delimiter == "," or not table.headings:
+    if not table.headings or thousands or (points and table.delimiter == ","):
         return "."
     grouped = all(_GROUPED.fullmatch(cell) for cell in points)
-    plain = all(_COMMA.fullmatch(cell) for cell in commas)
-    return "," if plain and grouped and not thousands else "."
+    return "," if grouped and all(_COMMA.fullmatch(cell) for cell in commas) else "."
+
+
+def odd_mark(table: SplitTable) -> str:
+    """Numbers with a decimal point among many more with a decimal comma, and where they are; "" where there are none."""
+    commas, points = _marks(table)
+    if len(points) * 4 > len(commas):
+        return ""
+    at = [(i, j) for i, row in enumerate(table.rows) for j, cell in enumerate(row) if cell in points]
+    told = some((f"{table.cell(i, j)!r} at {table.lines[i]}:{j + 1}" for i, j in at), 3)
+    return f"{told} among decimal commas" if at else ""
 
 
 def _in_a_comment(

@@ -15,7 +15,7 @@ from bemt.base.arrays import Array
 from bemt.base.tables import number_of
 from bemt.data.readers import SourceText, load_text, number
 from bemt.data.readers._words import english, plain
-from bemt.data.readers.split import SplitTable, decimal_mark, split_table
+from bemt.data.readers.split import SplitTable, decimal_mark, odd_mark, split_table
 from bemt.data.readers.unit_text import splits, unit_for
 
 EXPECTED = "r_over_R, chord_over_R and beta_deg; r and chord may be lengths, such as r_mm"
@@ -157,6 +157,8 @@ def read_stations(path: Path, R: float) -> BladeStations:
         source.add(table.lines[i], "another number of cells", f"{table.width}, as in line {top}")
     places = [by_name[name][0] for name in wanted]
     decimal = decimal_mark(table)
+    if decimal == "." and (odd := odd_mark(table)):
+        source.refuse("", odd, "one decimal mark")
     thicknesses = by_name["thickness"]
     thick, left = _thickness(table, thicknesses, decimal)
     columns = []

@@ -33,6 +33,7 @@ from typing import Any
 from bemt.base.document import Documented
 from bemt.physics.k1k2 import ZERO_THRUST_MEASURED
 
+_FINE_GRID = 0.02
 STATUSES = ("fine", "doubtful", "fault", "not stated")
 
 COMPRESSIBLE, COMPRESSIBLE_M_TIP, BUFFER_LAYER, TURBULENCE = 0.063, 0.625, 0.012, 0.016
@@ -145,8 +146,9 @@ def _grid(f: CfdFacts) -> Judged:
     cells = f"{f.cells:,.0f} cells" if f.cells > 0 else "cells not stated"
     if math.isfinite(f.u_grid):
         n = f.grids or 3
-        status = "fine" if f.u_grid <= 0.02 and n >= 3 else "doubtful"
-        return status, f"{n} grids, {cells}", f"u of the grid {f.u_grid:.2%} (GCI / 1.15)", f.u_grid
+        status = "fine" if f.u_grid <= _FINE_GRID and n >= 3 else "doubtful"
+        told = f"u of the grid {f.u_grid:.2%} (GCI / 1.15; {_FINE_GRID:.0%} on three grids is fine)"
+        return status, f"{n} grids, {cells}", told, f.u_grid
     if f.grids is None:
         return "not stated", f"grid study not stated; {cells}", "discretization unknown", math.nan
     words = "no grid study" if f.grids <= 1 else f"{f.grids} grids without an index"

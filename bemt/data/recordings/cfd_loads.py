@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -523,7 +524,7 @@ def counted_zones(
             run.notes.append(f"torque: {net or 'the whole'} less {', '.join(less)}: the shaft's own; thrust counts all")
         return [(1.0, net), *((-1.0, z) for z in less)], ducts
     if len(pool) > 1:
-        names = ",".join(pool)
+        names = shlex.quote(",".join(pool))
         hint = f"--zones {names} (leave out what does not count)"
         run.fault(None, "zones", f"{quantity} of {', '.join(pool)}", "the zones that count", hint)
     else:

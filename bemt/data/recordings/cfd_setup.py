@@ -28,6 +28,9 @@ CONDITIONS = (
 _GRID = ("grid_level", "cells")
 _ALIAS = {"level": "grid_level", "grid": "grid_level", "mesh": "grid_level", "grid level": "grid_level"}
 _LIKE_CELLS = 0.02
+_BATTERY = 100.0
+Conditions = dict[str, tuple[str, ...]]
+"""Conditions of a computed run by name, as texts, each with all values that its rows have."""
 FLIES = 0.5
 """Airspeed above which a rotor is not at rest [m/s]."""
 SETTLED = 0.01
@@ -148,9 +151,9 @@ def stated_of(d: Dataset) -> Mapping[str, Any]:
     return d.conditions if isinstance(d, CfdRun) else {}
 
 
-def conditions_of(d: Dataset) -> dict[str, tuple[str, ...]]:
+def conditions_of(d: Dataset) -> Conditions:
     """Conditions of a CFD recording as texts, each with all values that its rows have; {} where none is stated."""
-    out: dict[str, tuple[str, ...]] = {}
+    out: Conditions = {}
     for name, value in stated_of(d).items():
         if name in CONDITIONS and value not in (None, "") and value == value:
             out[name] = (_text(value),)
@@ -160,7 +163,8 @@ def conditions_of(d: Dataset) -> dict[str, tuple[str, ...]]:
             out.setdefault(key, tuple(found))
     for name, values in d.values.items():
         key = _ALIAS.get(name.lower(), name.lower())
-        if key in CONDITIONS and np.isfinite(values).any():
+        # a battery has cells, too
+        if key in CONDITIONS and np.nanmax(values, initial=-np.inf) > (_BATTERY if key == "cells" else -np.inf):
             out.setdefault(key, tuple(_text(v) for v in np.unique(values[np.isfinite(values)])))
     return out
 
@@ -174,7 +178,7 @@ def _text(value: Any) -> str:
     return str(value)
 
 
-def conditions_that_differ(a: Dataset, b: Dataset) -> dict[str, tuple[str, str]]:
+def conditions_that_differ(a: Dataset | Conditions, b: Dataset | Conditions) -> dict[str, tuple[str, str]]:
     """Conditions that both recordings state and that are not the same: name to the two, in the order of importance.
 
     >>> one = CfdRun("cfd", "a", {"thrust_N": [1.0]}, conditions={"cells": 1e6, "solver": "SST"})
@@ -182,7 +186,7 @@ def conditions_that_differ(a: Dataset, b: Dataset) -> dict[str, tuple[str, str]]
     >>> conditions_that_differ(one, two)
     {'cells': ('1,000,000', '2,000,000')}
     """
-    first, second = conditions_of(a), conditions_of(b)
+    first, second = (conditions_of(d) if isinstance(d, Dataset) else d for d in (a, b))
     out = {}
     for name in CONDITIONS:
         if name in first and name in second and not _alike(name, first[name], second[name]):
@@ -190,12 +194,17 @@ def conditions_that_differ(a: Dataset, b: Dataset) -> dict[str, tuple[str, str]]
     return out
 
 
+def other_setup(a: Conditions, b: Conditions) -> str:
+    """What of two set-ups that are stated is not the same, in words; "" where nothing is."""
+    return "; ".join(f"{k.replace('_', ' ')} {x} and {y}" for k, (x, y) in conditions_that_differ(a, b).items())
+
+
 def _alike(name: str, a: tuple[str, ...], b: tuple[str, ...]) -> bool:
     if set(a) == set(b):
         return True
-    if name in ("cells", "y_plus", "domain_over_D") and len(a) == len(b) == 1:
-        x, y = (float(v[0].replace(",", "")) for v in (a, b))
-        return abs(x - y) <= _LIKE_CELLS * max(abs(x), abs(y))
+    if name in ("cells", "y_plus", "domain_over_D"):
+        ends = ([float(f(float(v.replace(",", "")) for v in one)) for f in (min, max)] for one in (a, b))
+        return all(abs(x - y) <= _LIKE_CELLS * max(abs(x), abs(y)) for x, y in zip(*ends, strict=True))
     return False
 
 

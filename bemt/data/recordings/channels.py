@@ -8,6 +8,7 @@ entry of `dropped`.
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -115,6 +116,17 @@ def in_one_step(d: Dataset) -> str:
     """Command that states what the headings of a table leave open, as a sentence to append; "" where none is known."""
     step = next((note for note in d.notes if "bemt import " in note), "")
     return f"; {step}" if step else ""
+
+
+def asks(d: Dataset) -> dict[str, tuple[str, str, str]]:
+    """Quantities that no heading names and a column may be: its channel, why it may, and the option that says so."""
+    seen, out = named(d).values, {}
+    for quantity, name in d.provenance.get("asked", {}).items():
+        if name in d.values and not any(k.startswith(f"{quantity}_") for k in seen):
+            unit = d.unit(name).replace("_", "/")
+            option = f"--column {quantity}={shlex.quote(d.headings.get(name) or name)}"
+            out[quantity] = name, f"in {unit}, and no {quantity} is known", f"is it the {quantity}? {option}"
+    return out
 
 
 def runs_of(d: Dataset) -> Array:

@@ -20,6 +20,9 @@ from bemt.physics.dataset import Dataset
 __all__ = ["Finding", "check", "left_out"]
 
 _ROOMS = (slips, columns)
+LEFT_OUT = ("misread", "stuck_sensor")
+OPEN_OR_OUT = (*LEFT_OUT, "unnamed_column")
+"""Findings whose readings are left out, and these with what is to be asked about."""
 
 
 @np.errstate(all="ignore")  # a damaged file may hold any number
@@ -51,7 +54,7 @@ def left_out(source: Dataset, findings: Sequence[Finding]) -> Dataset:
     values, keep = {**source.values}, np.ones(len(source), dtype=bool)
     airspeed = file_name(named(source), "airspeed_m_s")
     for f in findings:
-        if f.id in ("misread", "stuck_sensor"):
+        if f.id in LEFT_OUT:
             values[f.channel] = np.array(values[f.channel])
             values[f.channel][list(f.rows)] = np.nan
             keep[list(f.rows)] &= f.channel != airspeed

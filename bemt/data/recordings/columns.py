@@ -118,13 +118,24 @@ def constant(facts: Facts) -> Iterator[Finding]:
             yield Finding("constant_column", own, text, fix, (), severity)
 
 
+@check_for("unnamed")
+def unnamed(facts: Facts) -> Iterator[Finding]:
+    """A column that may be the airspeed, or the state of the air, and has no heading that says so."""
+    for name, text, fix in facts.asked.values():
+        yield Finding("unnamed_column", name, text, fix, (), "warning")
+
+
 @check_for("misread")
 def misread(facts: Facts) -> Iterator[Finding]:
-    """A single load of a table of points at rest that lies far off the curve of the others."""
-    rpm = facts.rpm
+    """A single load of a table of points that lies far off the curve of the others."""
+    rpm, V = facts.rpm, facts.airspeed_m_s
     states = ("wall_distance_m", "tip_gap_m", "second_rotor_rad_s", "density_kg_m3", "pressure_Pa")
-    if rpm is None or facts.bare or "time_s" in facts.values or not facts.still.all():
+    if rpm is None or facts.bare or "time_s" in facts.values or "airspeed" in facts.asked:
         return
+    flow = None
+    if not facts.still.all():
+        with np.errstate(all="ignore"):
+            flow = facts.J if V is None else V / rpm * 1e3  # of the order of one
     if any(_varies(facts.values[k]) for k in states if k in facts.values):
         return
     for name in ("thrust_N", "torque_Nm"):
@@ -133,13 +144,18 @@ def misread(facts: Facts) -> Iterator[Finding]:
             continue
         size = np.abs(np.nan_to_num(v))
         good = (np.nan_to_num(rpm) > 0.0) & ~stuck(name, facts.values)
-        rows = np.flatnonzero(good & (size > 0.05 * float(np.median(size[size > 0.0]))))
-        times = lone(rpm[rows], size[rows])
+        if flow is None:
+            rows = np.flatnonzero(good & (size > 0.05 * float(np.median(size[size > 0.0]))))
+            times = lone(rpm[rows], size[rows])
+        else:
+            rows = np.flatnonzero(good & np.isfinite(flow) & np.isfinite(v))
+            times = lone(rpm[rows], v[rows] * float(np.sign(np.median(v[rows]))), flow[rows])
         for i, off in zip(rows[times != 1.0].tolist(), times[times != 1.0].tolist(), strict=True):
             text = (
                 f"{v[i]:.4g} in line {facts.lines[i]} is {off:.3g} times what the others give at {rpm[i]:.0f} rev/min"
             )
-            fix = "mistyped, or a loose contact? Measure it again; `diagnose` leaves it out"
+            text += "" if flow is None else f" and J {flow[i]:.2g}" if V is None else f" and {V[i]:.3g} m/s"
+            fix = "mistyped, or a loose contact? Measure it again; `diagnose` and `compare` leave it out"
             yield Finding("misread", facts.named(name), text, fix, (i,), "warning")
 
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.data.recordings.channels import named, names_of
+from bemt.data.recordings.channels import asks, named, names_of
 from bemt.physics.dataset import Dataset
 
 SEVERITIES = ("error", "warning", "note")
@@ -65,6 +65,7 @@ class Facts:
     ducted: bool = False  # Rotor in a duct
     bare: bool = False  # Recorded without a propeller: nothing is expected of its loads
     settled: bool = False  # Rows are means of computed flows: one is enough
+    asked: Mapping[str, tuple[str, str, str]] = field(default_factory=dict)  # As `channels.asks` gives it
 
     time_s, rpm, optical_rpm, electrical_rpm = _Channel(), _Channel(), _Channel(), _Channel()
     thrust_N, power_W, CT, CP, J, airspeed_m_s = (_Channel() for _ in range(6))
@@ -189,7 +190,7 @@ def facts_of(
         diameter_m if diameter_m is not None else said.get("diameter_m"),
         pitch_m if pitch_m is not None else said.get("pitch_m"), blades if blades is not None else own,
         ducted or about.get("rotor_ducted") == "yes" or about.get("duct") == "yes", about.get("propeller") == "none",
-        source.kind == "cfd",
+        source.kind == "cfd", asks(source),
     )  # fmt: skip
 
 

@@ -34,6 +34,7 @@ from bemt.judge.loss import SPREAD, checks_by_worth, minutes
 from bemt.physics.effects import catalogue
 
 AIR_OF_BOTH = "--air-a TEMPERATURE,PRESSURE --air-b TEMPERATURE,PRESSURE"
+ONE_SETUP = "compute both with one set-up: before that no physics is named"
 DAYS = (
     "note temperature and pressure of both days, with units as in 20C,1013hPa; density is the first thing that differs "
     "between days"
@@ -59,11 +60,15 @@ def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
     checks = {k: check for k in said.effects if (check := _check(k))}
     loads = [r for r in change.ratios.values() if r.kind in LOADS]
     apart = max((abs(math.log(r.ratio)) for r in loads), default=0.0)
-    days = math.isnan(change.density_ratio) and apart < _DAY
+    days = math.isnan(change.density_ratio) and apart < _DAY and not (change.a.setup and change.b.setup)
+    if change.other_setup and said.verdict in ("none", "insufficient"):
+        return {"text": ONE_SETUP, "command": ""}
     if said.verdict == "none" and days and apart > _SEEN:
         return {"text": DAYS, "command": asked.with_days()}
     if said.verdict == "none":
         text = "to see smaller changes, remove the propeller, mount it again and repeat each run once"
+        if change.a.setup and change.b.setup:
+            text = "to see smaller changes, compute both on a finer grid"
         return {"text": text, "command": ""}
     if said.why.startswith(_TOLD):
         return {"text": "", "command": ""}
@@ -319,8 +324,8 @@ def _at(word: str, r: Ratio) -> str:
 
 def _open(doc: ComparedRuns, size: str) -> str:
     """Why nothing is said, and what is likeliest."""
-    if doc.rule == NO_SPEED:
-        return f"Something changed{size}; {NO_SPEED}."
+    if doc.rule.endswith(NO_SPEED):
+        return f"Something changed: {doc.rule}."
     if doc.rule.endswith((IN_WIND, NOTHING_SHARED)):
         return f"These recordings cannot be compared: {doc.rule}."
     if doc.rule.startswith(SPREAD):
@@ -422,7 +427,7 @@ def sentence(doc: ComparedRuns) -> str:
     if doc.verdict == "unknown":
         return f"Unknown: {doc.rule}."
     first = [title_of(k) for k in _likely(doc)]
-    if doc.rule == OTHER_STAND or doc.rule.endswith((IN_WIND, NOTHING_SHARED)):
+    if doc.rule == OTHER_STAND or doc.rule.endswith((IN_WIND, NOTHING_SHARED, NO_SPEED)):
         return f"No cause can be given: {doc.rule}."
     if doc.rule.startswith(SPREAD):
         return f"No change is proven: {doc.rule}" + (f"; else {', '.join(first)}" if first else "") + "."

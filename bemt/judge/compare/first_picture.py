@@ -66,6 +66,12 @@ class PredictionView:
         median = float(np.median(ratio)) - 1.0 if ratio.size else float("nan")
         return int(np.sum(np.abs(y - f)[good] <= half[good])), int(good.sum()), median
 
+    def width(self, channel: str) -> float:
+        """Half the 95 % band at the points, median, over the prediction there [1]."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            shares = [np.abs(m.u[channel] / m[channel]) for m in self._beside(channel)]
+        return float(np.nanmedian(np.concatenate(shares)))
+
     def _beside(self, channel: str) -> list[Dataset]:
         return [m for r, m in zip(self.recorded, self.model, strict=True) if channel in r]
 
@@ -261,9 +267,8 @@ def title(doc: ComparedRuns) -> str:
 
 
 def _along(c: MatchedChannel) -> int:
-    """Coordinate of the abscissa: the advance ratio where it alone varies."""
-    steady = c.name not in OVER_COMMAND and float(np.ptp(c.x[:, 0])) < _STEADY
-    return 1 if steady and c.advance_moves() else 0
+    """Coordinate of the abscissa: the advance ratio where it varies."""
+    return int(c.name not in OVER_COMMAND and float(np.ptp(c.x[:, 1])) > _MOVES)
 
 
 def _axis(change: RunChange, c: MatchedChannel) -> tuple[str, Callable[[Array], Array]]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
+from bemt.data.recordings import cfd_setup
 from bemt.data.recordings.channels import in_one_step, moves, named
 from bemt.data.recordings.reduce import reduce, reduction
 from bemt.judge.compare.selection import COLD, HOT, LOAD_CHANNELS, conditions_of, one_rotor, speed_in_doubt, wind_of
@@ -53,6 +54,7 @@ class StandRun:
     misread: tuple[int, int] = (0, 0)  # Speeds that no rotor can have at their command or load, and all
     # Speed below which thrust is negative as in a wind that is not recorded [rev/min]; NaN: no such wind
     zero_thrust_rpm: float = math.nan
+    setup: cfd_setup.Conditions = field(default_factory=dict)  # How a run of CFD was computed, as far as it says
 
     def __len__(self) -> int:
         """Give the number of points."""
@@ -107,6 +109,7 @@ def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> 
         _shifts(series, bool(ramp)),
         (int(false.sum()) + len(gone), (int(np.isfinite(series.rpm).sum()) if "rpm" in series else 0) + len(gone)),
         math.nan if (zero := wind_of(imported)) is None else zero,
+        cfd_setup.conditions_of(imported),
     )
 
 

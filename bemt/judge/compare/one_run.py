@@ -25,7 +25,14 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of, number_text, speed_text, text_table
 from bemt.data.recordings.audit import AuditLine, combined
 from bemt.data.recordings.cfd_run import is_run, run_at
-from bemt.data.recordings.cfd_setup import Elsewhere, audit_of, conditions_of, faults_first, floor_note, grid_floor
+from bemt.data.recordings.cfd_setup import (
+    Elsewhere,
+    audit_of,
+    conditions_of,
+    faults_first,
+    floor_note,
+    grid_floor,
+)
 from bemt.data.recordings.channels import named, without_unit
 from bemt.physics.dataset import Dataset
 from bemt.rotors.as_measured import FACTOR
@@ -249,19 +256,25 @@ def _verdict(E: float, u: float) -> str:
     return "agrees" if abs(E) <= u else "within 2 u" if abs(E) <= _WIDE * u else "differs"
 
 
-def _fluid(loads: Sequence[BothLoads], density: float) -> str:
-    """What all loads look like if the run is of another density than was taken; "" where none brings all of them near.
+def other_fluid(off: Sequence[float], u: Sequence[float], density: float) -> str:
+    """In which other fluid all loads would be as a model has them; "" where none is nearer by half, within two u.
 
-    Nearer by half or more, and within twice both bands.
+    ``off``: loads of the run over the model's, natural logarithm; ``u``: their standard uncertainty [1].
     """
-    said = [load for load in loads if load.cfd and load.bemt and math.isfinite(load.u_both)]
+    y, wide = np.array(off), np.array(u)
     for words, other in _FLUIDS.items():
         far = math.log(other / density)
-        off = np.array([math.log(max(load.cfd / load.bemt, 1e-9)) for load in said])
-        wide = np.array([_share(load) for load in said])
-        if said and np.all(np.abs(off - far) < np.minimum(0.5 * np.abs(off), _WIDE * wide)):
-            return f" All loads are about {math.exp(far):.3g} times BEMT's, as in {words}: first check the density."
+        if y.size and np.all(np.abs(y - far) < np.minimum(0.5 * np.abs(y), _WIDE * wide)):
+            return f"All loads are about {math.exp(far):.3g} times BEMT's, as in {words}: first check the density"
     return ""
+
+
+def _fluid(loads: Sequence[BothLoads], density: float) -> str:
+    """What all loads look like if the run is of another density than was taken; "" where none brings them near."""
+    said = [load for load in loads if load.cfd and load.bemt and math.isfinite(load.u_both)]
+    off = [math.log(max(load.cfd / load.bemt, 1e-9)) for load in said]
+    found = other_fluid(off, [_share(load) for load in said], density)
+    return f" {found}." if found else ""
 
 
 def _share(load: BothLoads) -> float:

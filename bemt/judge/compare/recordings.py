@@ -6,14 +6,17 @@ No case and no blade is needed. What is not recorded is assumed to be equal in b
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
+from bemt.base.tables import number_of
 from bemt.base.units import ZERO_CELSIUS
+from bemt.data.readers.split import some
+from bemt.data.recordings import cfd_setup
 from bemt.judge.compare import smooth_change as fits
 from bemt.judge.compare.drive_laws import (
     SUPPLY,
@@ -28,7 +31,9 @@ from bemt.judge.compare.drive_laws import (
 from bemt.judge.compare.matched import (
     DRIVE,
     LOADS,
+    OVER_COMMAND,
     POWER_OF_SPEED,
+    SESSION,
     WITHOUT_SPEED,
     MatchedChannel,
     StandRun,
@@ -42,7 +47,7 @@ REVERSED = "thrust has the other sign in B, and its size is the same"
 """Verdict of a reversed cell, or of a rotor that is mounted or turns the other way round."""
 AS_RECORDED = ("density as recorded", "by the thermometers")
 """Starts of the reason of a density that both files state."""
-ERROR_IN = "error in "
+ERROR_IN = ("error in ", "warning in ")
 """Start of a note on what cannot be so in A or B."""
 # Recorded densities are this good: a barometer, a thermometer and nobody's humidity, share.
 _TOLD_DENSITY, _SURE = 0.012, 2.0
@@ -87,10 +92,26 @@ class RunChange:
         """Verdict on what acts on the rotor, worked out when it is asked for."""
         if not self.without_speed:
             return self.judge(self) if self.loads_by_name else NO_VERDICT
-        ((name, c),) = self.rotor.channels.items()
-        P = weigh_factor(c, self.rotor.likelier[name])
+        # a cut blade takes less power, and gives as much thrust for it: at one command both are less
+        P = min((weigh_factor(c, scatter) for c, scatter in self._bare), key=lambda P: P[NONE])
         said = decide(P)
-        return Judgement.of(replace(said, why=NO_SPEED) if said.by == "files" else said, P)
+        return Judgement.of(replace(said, why=self.no_speed) if said.by == "files" else said, P)
+
+    @property
+    def _bare(self) -> list[tuple[MatchedChannel, fits.Scatter]]:
+        """Thrust at what stands for the speed, with its scatter: at equal power, at equal command and known voltage."""
+        runs, volts = [self.rotor], [r.points.values.get("voltage_V") for r in (self.a, self.b)]
+        V = [float(np.nanmean(v)) for v in volts if v is not None]
+        if "at_power" in self.rotor.channels and len(V) == 2 and abs(V[1] / V[0] - 1.0) < SESSION["voltage"]:
+            runs.append(fits.prepared(self.a, self.b, ("at_command",), self.diameter_m))
+        return [(c, run.likelier[name]) for run in runs for name, c in run.channels.items()]
+
+    @property
+    def no_speed(self) -> str:
+        """Why thrust that changed has no cause without a speed, with its change at each."""
+        found = [fits.ratio_of(c, scatter) for c, scatter in self._bare]
+        told = {f"{r.ratio - 1.0:+.1%} at equal {WITHOUT_SPEED[r.kind]}": None for r in found}
+        return f"thrust {', '.join(told)}; {NO_SPEED}"
 
     @cached_property
     def drive(self) -> Judgement:
@@ -196,6 +217,11 @@ class RunChange:
         return min(loads, default=0.0) >= math.log(_FAR_OFF)
 
     @property
+    def other_setup(self) -> str:
+        """How B was computed otherwise than A, in words; "" where nothing says so."""
+        return cfd_setup.other_setup(self.a.setup, self.b.setup)
+
+    @property
     def wind(self) -> str:
         """Why the runs cannot be compared where one windmills, the other does not, and nobody says in what wind."""
         runs = (("A", self.a), ("B", self.b))
@@ -208,7 +234,8 @@ class RunChange:
     @property
     def no_pair(self) -> str:
         """Why the runs cannot be compared; "" where they can."""
-        return self.wind or (NOTHING_SHARED if self.apart else OTHER_STAND if self.far_off else "")
+        other = f"computed otherwise: {self.other_setup}" if self.other_setup else ""
+        return self.wind or (NOTHING_SHARED if self.apart else OTHER_STAND if self.far_off else other)
 
     @property
     def by_density(self) -> str:
@@ -316,12 +343,16 @@ def _assumed(a: StandRun, b: StandRun, diameter: float, loads: Mapping[str, Matc
     return [words for open_, words in said if open_]
 
 
-def _notes(a: StandRun, b: StandRun, channels: Mapping[str, MatchedChannel], strays: Mapping[str, int]) -> list[str]:
-    out = [_misread(letter, run) for letter, run in (("A", a), ("B", b)) if run.misread[0]]
+def _notes(
+    a: StandRun, b: StandRun, channels: Mapping[str, MatchedChannel], strays: Mapping[str, MatchedChannel]
+) -> list[str]:  # fmt: skip
+    other = cfd_setup.other_setup(a.setup, b.setup)
+    out = [f"computed otherwise: {other}"] if other else []
+    out += [_misread(letter, run) for letter, run in (("A", a), ("B", b)) if run.misread[0]]
     out += [note for c in channels.values() for note in c.notes]
     out += [
-        f"{n} reading{'s' if n > 1 else ''} of {channels[k].channel} far from all others dropped"
-        for k, n in strays.items()
+        f"{number_of(c.y.size, 'reading')} of {c.channel} far from all others dropped: {some(_told_of(c), 3)}"
+        for c in strays.values()
     ]
     for c in channels.values():
         low, high = c.common()
@@ -331,6 +362,15 @@ def _notes(a: StandRun, b: StandRun, channels: Mapping[str, MatchedChannel], str
     if a.command and b.command and a.command != b.command:
         out.append(f"different types of command ({a.command}, {b.command}): the drive is not compared")
     return list(dict.fromkeys([*out, *(f"A: {n}" for n in a.points.notes), *(f"B: {n}" for n in b.points.notes)]))
+
+
+def _told_of(c: MatchedChannel) -> Iterator[str]:
+    """Readings of a channel, each with where it was taken."""
+    at = c.x[:, 0] if c.name in OVER_COMMAND else np.exp(c.x[:, 0])
+    power = 0.0 if c.name in OVER_COMMAND else POWER_OF_SPEED.get(c.channel, 0.0)
+    size = np.exp(c.y + c.log_density * c.second) * at**power
+    for v, x, J, second in zip(size, at, c.x[:, 1], c.second, strict=True):
+        yield f"{v:.4g} at {x:.4g}{f' and advance {J:.2f}' if J else ''} in {'B' if second else 'A'}"
 
 
 def _misread(letter: str, run: StandRun) -> str:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.units import KNOT, MPH, RPM, ZERO_CELSIUS, split_suffix
 from bemt.data.readers.headings import counts_electrical, may_be_shaft_speed, surely_shaft_speed
-from bemt.data.recordings.channels import MEASURED, in_one_step, moves, named, names_of
+from bemt.data.recordings.channels import MEASURED, asks, in_one_step, moves, named, names_of
 from bemt.data.recordings.findings import zero_thrust_speed
 from bemt.data.recordings.shown import options_of
 from bemt.physics.air import AIR_C, Air
@@ -225,8 +225,12 @@ def with_headings(imported: Dataset, name: str) -> None:
 
 
 def speed_in_doubt(imported: Dataset, path: str) -> None:
-    """Refuse a file whose speed cannot be read: it must not be left out, nor replaced by that of a case."""
+    """Refuse a file whose speed, or airspeed, cannot be read: it must not be left out, nor replaced by that of a case."""
     told = named(imported).values
+    if (doubt := asks(imported).get("airspeed")) and "J" not in told:
+        name, got, fix = doubt
+        hint = f"{fix[0].upper()}{fix[1:]}; in still air: --airspeed-m-s 0 (compare: --air-a 0m/s, --air-b 0m/s)"
+        raise InputError(Fault(path, f"column {imported.headings.get(name, name)}", got, "the airspeed", hint))
     if "rpm" in told:
         return
     headings = imported.headings

@@ -137,21 +137,21 @@ def scatter_of(c: MatchedChannel, change: Array | None = None) -> tuple[Scatter,
     return best, score
 
 
-def without_strays(c: MatchedChannel) -> tuple[MatchedChannel, int]:
-    """Leave out readings that all others contradict (each predicted by the rest)."""
-    n = 0
+def without_strays(c: MatchedChannel) -> tuple[MatchedChannel, MatchedChannel]:
+    """Leave out readings that all others contradict (each predicted by the rest); gives these too."""
+    whole, left = c, np.ones(c.y.size, dtype=bool)
     for _ in range(3):
         s, _ = scatter_of(c)
         y = c.y - c.y.mean()
         worst = np.abs(leave_one_out(covariance(c, s) + free_change(c), y)) > _FAR
         if not worst.any() or worst.sum() > max(1, 0.1 * y.size) or y.size - worst.sum() < 6:
             break
-        n += int(worst.sum())
         keep = ~worst
         if min(keep[c.second].sum(), keep[~c.second].sum()) < 2:
             break
         c = taken(c, keep)
-    return c, n
+        left[left] = keep
+    return c, taken(whole, ~left)
 
 
 class Ratio(Documented):
@@ -255,7 +255,7 @@ class MatchedRuns:
     free: Mapping[str, Scatter]
     steady: Mapping[str, Scatter]
     likelier: Mapping[str, Scatter]  # The better of the two
-    strays: Mapping[str, int]  # Readings that were left out
+    strays: Mapping[str, MatchedChannel]  # Readings that were left out
 
 
 def prepared(a: StandRun, b: StandRun, names: Sequence[str], diameter: float) -> MatchedRuns:
@@ -264,14 +264,14 @@ def prepared(a: StandRun, b: StandRun, names: Sequence[str], diameter: float) ->
     free: dict[str, Scatter] = {}
     steady: dict[str, Scatter] = {}
     likelier: dict[str, Scatter] = {}
-    strays: dict[str, int] = {}
+    strays: dict[str, MatchedChannel] = {}
     for name in names:
         found = matched(a, b, name, diameter)
         if found is not None:
-            channels[name], n = without_strays(in_common(found))
+            channels[name], stray = without_strays(in_common(found))
             free[name], loose = scatter_of(channels[name])
             steady[name], stiff = scatter_of(channels[name], steady_change(channels[name]))
             likelier[name] = free[name] if loose > stiff else steady[name]
-            if n:
-                strays[name] = n
+            if stray.y.size:
+                strays[name] = stray
     return MatchedRuns(channels, free, steady, likelier, strays)

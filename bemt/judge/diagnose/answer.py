@@ -48,7 +48,8 @@ class Location:
     size: float  # Mean mismatch in the interval, share of the largest value of the channel at the speeds there [1]
     z: float  # Sum of the standardised mismatch over the root of the number of readings [1]
     ties: tuple[str, ...]  # Other variables that explain it as well in this plan
-    # Median of the recording over the case there, less 1, as a headline says it; NaN where loads are near zero [1]
+    # Median of the recording over the case there, over that of a reference, less 1, as a headline says it; NaN where
+    # loads are near zero [1]
     ratio: float = field(default=float("nan"), compare=False)
     shared: float = field(default=0.0, compare=False)  # Standard uncertainty that all readings share, as stated [1]
     mismatch: Array = field(
@@ -106,7 +107,9 @@ def _largest(found: Evidence, d: Array, natural: tuple[str, ...]) -> Location:
     size = float(np.mean((d / problem.largest)[here][inside]))
     f0 = problem.f0[here][inside]
     loaded = bool(np.all(np.abs(f0) > _NEAR_ZERO * problem.largest[here][inside]))
-    ratio = float(np.median(problem.y[here][inside] / f0)) - 1.0 if loaded else float("nan")
+    known = (problem.channel == channel) & ~free & (np.abs(problem.f0) > _NEAR_ZERO * problem.largest)
+    usual = float(np.median(problem.y[known] / problem.f0[known])) if known.any() else 1.0
+    ratio = float(np.median(problem.y[here][inside] / f0)) / usual - 1.0 if loaded else float("nan")
     return Location(CHANNELS[int(channel)], name, low, high, size, z, ties, ratio, 0.0, d)
 
 

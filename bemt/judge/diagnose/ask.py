@@ -239,15 +239,15 @@ def _one_point(
 
 
 def _inside(records: Sequence[Record], cases: Sequence[Case]) -> str:
-    """That every reading lies inside the band of its case; "" where one does not, or there are several cases."""
+    """That every reading lies inside the band of its case, and what that hides; "" where one does not."""
     own = [r for r in records if not r.reference]
     (view, *more) = pictures.first_picture(own, cases)
     counts = [view.inside(c)[:2] for c in view.channels]
-    return (
-        view.sentence.partition(";")[0].rstrip(".") + "."
-        if not more and all(n == total for n, total in counts) and any(t for _, t in counts)
-        else ""
-    )
+    if more or any(n != total for n, total in counts) or not any(t for _, t in counts):
+        return ""
+    wide = " and ".join(f"{100.0 * view.width(c):.0f} %" for c in view.channels)
+    hides = "" if any(r.reference for r in records) else f" (± {wide} wide: a level inside it tells nothing)"
+    return view.sentence.partition(";")[0].rstrip(".") + f"{hides}."
 
 
 def _both_there(cases: list[Any], files: list[Any], known: list[Any], theirs: Any, percent: float | None) -> None:

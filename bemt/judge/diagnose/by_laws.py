@@ -100,6 +100,8 @@ def _factored(found: posterior.Evidence, pair: RunChange) -> dict[Explanation, f
     A ratio of pole pairs moves the speeds apart itself, a unit the loads.
     """
     P = found.probability
+    if pair.other_setup:
+        P = knowledge.shared_with_files(P, {k for k in P if k.ids or k == UNKNOWN})
     if pair.by_proxy:  # the losses of a motor are something smooth that is no cause
         P = {**P, UNKNOWN: 0.0, DOUBT: P[UNKNOWN]}
     if pair.turned:  # nothing but the cell or the sense of rotation turns thrust round
@@ -129,18 +131,14 @@ def weighed(
     problem = replace(assemble(parts(LAWS)), variants=tuple(map(parts, VARIANTS)))
     names = [i for i in law_effects() if (only is None or i in only) and i not in gone]
     candidates, _ = signatures.candidates(problem, names)
-    candidates = tuple(c for c in (_as_counted(c, pair) for c in candidates) if c is not None)
+    # what two thermometers leave open of the density counts as repeatability
+    thermometers = density_change(pair.a, pair.b)[1]
+    candidates = tuple(as_counted(c, pair) for c in candidates if not (thermometers and c.id == "air_density"))
     return posterior.weigh(problem, knowledge.possible(problem, candidates))
 
 
-def _as_counted(candidate: Candidate, pair: RunChange) -> Candidate | None:
-    """Candidate with the odds that the recordings tell besides the loads; None where they rule it out.
-
-    One motor at one command turns about as fast as before, whatever is indicated. What two thermometers leave open of
-    the density counts as repeatability.
-    """
-    if candidate.id == "air_density" and density_change(pair.a, pair.b)[1]:
-        return None
+def as_counted(candidate: Candidate, pair: RunChange) -> Candidate:
+    """Candidate with the odds of the drive: a motor at one command turns about as fast as before, whatever is read."""
     if candidate.id not in ("rpm_scale", "unit_slip"):
         return candidate
     read = [abs(s["factor"]) * (1.0 + s.get("eps", 0.0)) if s.get("channel", "rpm") == "rpm" else 1.0
@@ -241,6 +239,7 @@ def _record(
         reference=reference, repeatability=repeatability,
         electrical=channels.get("torque_Nm") == "electrical_power_W",
         unitless=frozenset(k for k, c in channels.items() if c in ("CT", "CP", "CQ")),
+        computed=points.kind == "cfd" or bool(run.setup), setup=run.setup,
     )  # fmt: skip
     return record.take(np.flatnonzero(good))
 

@@ -14,6 +14,7 @@ from bemt.base.arrays import Array
 from bemt.base.gaussian.evidence import shares
 from bemt.base.gaussian.whitening import whitener
 from bemt.judge import loss
+from bemt.judge.compare.change_document import ONE_SETUP
 from bemt.judge.diagnose import by_laws, form, knowledge, noise, other_rotor, posterior, signatures
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import suggest as suggestion
@@ -107,9 +108,11 @@ def _diagnose(
     candidates = tuple(c for c in knowledge.possible(problem, candidates) if c.id not in given.ruled_out)
     absent |= dict.fromkeys(given.ruled_out, "ruled out by a check")
     problem, candidates = ask_reference(problem, candidates)
+    change = ratios(absent.keys()) if any(p.record.reference for p in problem.parts) else None
+    if change is not None:
+        candidates = tuple(by_laws.as_counted(c, change) for c in candidates)
     say("weighing explanations")
     found = posterior.weigh(problem, candidates, gone=gone)
-    change = ratios(absent.keys()) if any(p.record.reference for p in problem.parts) else None
     found = replace(found, probability=knowledge.combined(found, change))
     P = _of_motor(found)
     decision = _decided(P, found.probability)
@@ -243,6 +246,8 @@ def _settling(found: posterior.Evidence, decision: loss.Decision, best: fitting.
     if decision.verdict == "none":
         faint = rivals_of(["", *singles][:_MOST_RIVALS])
         return suggestion.nothing_called_for(found, faint, found.probability[UNKNOWN])
+    if decision.by == "files" and found.problem.setups_that_differ:
+        return suggestion.Suggestion(ONE_SETUP, (), (), 0.0, 0.0, "cfd")
     if decision.verdict == "insufficient" and (mend := other_rotor.to_mend(found.problem)):
         return suggestion.mended(found, mend)
     if other_rotor.doubted(found.problem, decision):

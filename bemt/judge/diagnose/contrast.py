@@ -24,7 +24,7 @@ from bemt.judge.compare.change_document import (
     text,
 )
 from bemt.judge.compare.matched import stand_run
-from bemt.judge.compare.recordings import ERROR_IN, RunChange
+from bemt.judge.compare.recordings import RunChange
 from bemt.judge.compare.selection import Invocation, conditions_of, selected, with_air
 from bemt.judge.diagnose.by_laws import changed
 from bemt.rotors.propeller import Propeller, rotor_of
@@ -76,6 +76,11 @@ class Contrast(Answered):
     def effects(self) -> tuple[str, ...]:
         """Effects of the verdict; of a class all members."""
         return self.said.effects
+
+    @property
+    def probability(self) -> float | None:
+        """Probability of the verdict [1]; None without one."""
+        return self.said.probability
 
     @property
     def text(self) -> str:
@@ -239,17 +244,19 @@ def _write(out: Path, found: Contrast | Told, figures: bool, files: Sequence[str
 
 
 def _findings(imported: Dataset, diameter_m: float | None, ducted: bool) -> tuple[Finding, ...]:
-    """What cannot be so in a recording, as ``import`` and ``diagnose`` find it."""
-    from bemt.data.recordings.check import check
+    """What cannot be so in a recording, what it leaves open or out, as ``import`` and ``diagnose`` find it."""
+    from bemt.data.recordings.check import OPEN_OR_OUT, check
 
     found = check(imported, diameter_m=diameter_m, ducted=ducted) if imported.kind in ("bench", "table") else ()
     # a propeller that windmills pulls the other way; signs have a note of their own
-    return tuple(f for f in found if f.severity == "error" and f.id != "sign_flipped")
+    return tuple(f for f in found if (f.severity == "error" or f.id in OPEN_OR_OUT) and f.id != "sign_flipped")
 
 
 def _sound(imported: Dataset, findings: Sequence[Finding]) -> Dataset:
-    """The recording without columns that are no measurement."""
-    gone = {f.channel for f in findings if f.id == _STUCK}
+    """The recording without readings, and columns, that are no measurement."""
+    from bemt.data.recordings.check import left_out
+
+    imported, gone = left_out(imported, findings), {f.channel for f in findings if f.id == _STUCK}
     if not gone:
         return imported
     values = {k: v for k, v in imported.values.items() if k not in gone}
@@ -257,12 +264,13 @@ def _sound(imported: Dataset, findings: Sequence[Finding]) -> Dataset:
 
 
 def _errors(findings: Sequence[Sequence[Finding]]) -> list[str]:
-    """Notes on what cannot be so in A and B."""
+    """Notes on what cannot be so in A and B, and on what is open or left out."""
     out = []
     for letter, found in zip("AB", findings, strict=True):
         for f in found:
             told = f.evidence if f.evidence.startswith(f.channel) else f"{f.channel}: {f.evidence}"
-            out.append(f"{ERROR_IN}{letter}: {f.id}: {told}" + ("; left out" if f.id == _STUCK else ""))
+            left = "; left out" if f.id == _STUCK else f"; {f.correction}" if f.severity == "warning" else ""
+            out.append(f"{f.severity} in {letter}: {f.id}: {told}{left}")
     return out
 
 

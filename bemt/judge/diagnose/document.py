@@ -248,8 +248,9 @@ def explanation(d: Diagnosis) -> list[str]:
     speaks = d.found.probability.get(DOUBT, 0.0) > d.found.prior.get(DOUBT, 1.0)
     likelier = open_ and level and speaks and not doubted
     if likelier or doubted or decision.effects[:1] == (AnotherPropeller.id,):
-        lead = f"The loads are off the case ({off}): are diameter, pitch and blades its own? " if likelier else ""
-        lines.append(f"{lead}Nearest rotors: {other_rotor.nearest_rotors(d.problem)}.")
+        lead = f"The loads are off the case ({off}): are diameter, pitch and blades its own?" if likelier else ""
+        near = other_rotor.nearest_rotors(d.problem)
+        lines += [told] if (told := " ".join(filter(None, (lead, near and f"Nearest rotors: {near}.")))) else []
     if decision.verdict == "none":
         lines.append(f"Why: {decision.why}.")
         if max((abs(v) for v in level.values()), default=0.0) > _WORTH_SAYING:
@@ -345,7 +346,10 @@ def _of_class(d: Diagnosis) -> str:
         return f"Two causes: {' and '.join(f'one of ({w})' if ' / ' in w else w for w in each)}"
     if len(titles) > _A_GROUP:
         return f"{len(titles)} causes look alike in these readings: {families(said.effects)}"
-    return f"The cause is {' or '.join(titles)}; these readings cannot distinguish them"
+    chance, lead = d.found.probability.get(said.leading, 0.0), said.leading.ids
+    most = " and ".join(_with_size(d, i) for i in said.leading) if lead and lead <= {*said.effects} else ""
+    most = f"; {most} is likeliest, probability {chance:.2f}" if most and chance >= _GUESS else ""
+    return f"The cause is {' or '.join(titles)}; these readings cannot distinguish them{most}"
 
 
 def _off(d: Diagnosis) -> str:

@@ -139,7 +139,9 @@ def possible(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Candida
     unread = set() if any(r.air_recorded for r in tested) else {"density_kg_m3"}
     unread |= {"torque_Nm"} if any(r.electrical for r in tested) else set()
     bare = frozenset[str]().union(*(r.unitless for r in tested))
-    able = (c for c in candidates if effects.catalogue()[c.id].sensor not in unread)
+    # what is computed comes from no cell and no anemometer; its units and its speed were typed in
+    cells = {"thrust_N", "torque_Nm", "airspeed_m_s"} if all(r.computed for r in tested) else unread
+    able = (c for c in candidates if effects.catalogue()[c.id].sensor not in cells | unread)
 
     def read(setting: Mapping[str, Any]) -> bool:  # a sign needs no unit
         of = setting.get("channel")
@@ -193,7 +195,9 @@ def both(P: Mapping[Explanation, float], laws: Mapping[Explanation, float]) -> d
 
 
 def reason(problem: Problem, said: Decision) -> Decision:
-    """The same decision; of a broken relation the relation itself is the reason."""
+    """The same decision; of a broken relation the relation itself is the reason, of another set-up that."""
+    if said.by == "files" and problem.setups_that_differ:
+        return replace(said, why=f"recording and reference were computed otherwise: {problem.setups_that_differ}")
     for name, finding in other_rotor.exact_faults(problem):
         if said.effects == (name,):
             return replace(said, why=f"{finding.evidence}, by definition")
@@ -202,17 +206,20 @@ def reason(problem: Problem, said: Decision) -> Decision:
 
 def _doubted(problem: Problem, P: Mapping[Explanation, float]) -> dict[Explanation, float]:
     """Share of the fault of file or case: of what no listed cause explains where a file cannot be right, of nearly all
-    where repeats differ as on no stand, or another rotor is recorded.
+    where repeats differ as on no stand, another rotor is recorded, or CFD and its reference have another set-up.
     """  # noqa: D205
-    share = DOUBTFUL / (1.0 + DOUBTFUL)
+    if problem.setups_that_differ:
+        return shared_with_files(P, {k for k in P if k.ids or k == UNKNOWN})
     if _unlike(problem):
         return _by_level(P, other_rotor.by_level(problem))
-    elif other_rotor.unrepeatable(problem):
-        lost = {k: share * p for k, p in P.items() if k.ids}
-    elif other_rotor.impossible(problem):
-        lost = {UNKNOWN: share * P[UNKNOWN]}
-    else:
-        return dict(P)
+    if other_rotor.unrepeatable(problem):
+        return shared_with_files(P, {k for k in P if k.ids})
+    return shared_with_files(P, {UNKNOWN}) if other_rotor.impossible(problem) else dict(P)
+
+
+def shared_with_files(P: Mapping[Explanation, float], some: Collection[Explanation]) -> dict[Explanation, float]:
+    """Posterior in which file or case are to blame for some explanations, with the odds of that."""
+    lost = {k: P[k] * DOUBTFUL / (1.0 + DOUBTFUL) for k in some}
     out = {k: p - lost.get(k, 0.0) for k, p in P.items()}
     return out | {DOUBT: P.get(DOUBT, 0.0) + sum(lost.values())}
 

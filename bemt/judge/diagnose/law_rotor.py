@@ -285,8 +285,8 @@ def _profile(loads: Loads, flow: Flow, laws: Laws) -> Array:
 
 
 def _untwist(e: Any, loads: Loads, flow: Flow, laws: Laws) -> None:
-    """Nose down by tip_deg (r/R)^2 in proportion to rho Omega^2; at 0.75 R."""
-    _turned(-e.tip_deg * _AT**2 * e.share(flow), loads, flow, laws)
+    """Nose down by turn_deg at 0.75 R in proportion to rho Omega^2."""
+    _turned(-e.turn_deg * e.share(flow), loads, flow, laws)
 
 
 def _section(e: Any, loads: Loads, flow: Flow, laws: Laws) -> None:

@@ -67,7 +67,7 @@ def load(
     """Read one recording, whatever its format."""
     from bemt.data.recordings.cfd_options import filled
     from bemt.data.recordings.cfd_run import is_run, run_at
-    from bemt.data.recordings.cfd_setup import one_grid
+    from bemt.data.recordings.cfd_setup import conditions_of, one_grid
     from bemt.data.recordings.load import import_file
     from bemt.data.recordings.reduce import reduce, reduction
 
@@ -76,13 +76,14 @@ def load(
     if imported is None:
         imported = import_file(path)
         imported = filled(imported, rpm, airspeed_m_s, density_kg_m3) if is_run(imported) else imported
+    setup = conditions_of(imported)
     if not is_run(imported):
         _one_setup(imported, path)
         one_rotor(imported, path, "`compare A B --rows-b rotor={} --case CASE` takes one of them")
     if is_run(imported):
         run, gains = one_grid(imported)
         made = records.from_series(run, case, gains)
-        return replace(made, notes=(*made.notes, *imported.notes), computed=True)
+        return replace(made, notes=(*made.notes, *imported.notes), computed=True, setup=setup)
     imported = filled(imported, rpm, airspeed_m_s, density_kg_m3)
     speed_in_doubt(imported, path)
     _speed_missing(imported, path)
@@ -114,8 +115,8 @@ def load(
     broken = tuple(f for f in findings if f.severity == "error" or (f.id == "sign_flipped" and f.severity == "warning"))
     units = imported.provenance.get("declared", {})
     declared = {k: units[name] for k in rows.values if (name := file_name(rows, k)) in units}
-    return replace(made, findings=found, contradictions=broken, notes=notes, computed=imported.kind == "cfd",
-                   declared=declared)  # fmt: skip
+    return replace(made, findings=found, contradictions=broken, notes=notes, declared=declared,
+                   computed=imported.kind == "cfd" or bool(setup), setup=setup)  # fmt: skip
 
 
 def _speed_missing(imported: Dataset, path: str) -> None:

@@ -224,7 +224,7 @@ def _fading(problem: Problem, change: Array) -> Array:
 def _other_forms(e: Effect) -> list[str]:
     """Published laws of an effect beside its own: nobody knows which of them holds for this rotor."""
     mine = getattr(e, "form", None)
-    return sorted({str(s["form"]) for s in e.variants() or () if "form" in s} - {mine}) if mine and e.diagnosed else []
+    return sorted({*e.words.get("form", ())} - {mine}) if mine and e.diagnosed else []
 
 
 def _by_volts(part: Part) -> Array:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from bemt.base import unit_errors
 from bemt.base.arrays import Array
 from bemt.base.gaussian.evidence import LinearTerms, log_sum
-from bemt.base.tables import number_text
+from bemt.base.tables import number_of, number_text
 from bemt.base.units import INCH
 from bemt.judge.diagnose.blade import AS_BUILT, LABELLED, AsLabelled
 from bemt.judge.diagnose.form import ALIKE
@@ -254,7 +254,8 @@ def _at_other_advance(problem: Problem, size: float) -> Array:
 
 def doubted(problem: Problem, said: Decision) -> bool:
     """Whether it is the rotor of the case that is in doubt, and not a file."""
-    return said.by == "files" and not contradiction(problem)[0] and not unrepeatable(problem)
+    elsewhere = contradiction(problem)[0] or unrepeatable(problem) or problem.setups_that_differ
+    return said.by == "files" and not elsewhere
 
 
 def nearest_rotors(problem: Problem) -> str:
@@ -262,7 +263,9 @@ def nearest_rotors(problem: Problem) -> str:
     found = {c: math.log(abs(v)) for c, v in levels(problem).items() if v}
     chords = [("chord", f"chord {100.0 * (k - 1.0):+.0f} %", _Chord(k), 0.5) for k in _CHORDS]
     slips = [s for s in _slips(problem, found) if s[0] in _ROTORS]
-    return " or ".join(s.words for s in _ranked(found, [*slips, *_shapes(problem, found, chords)]))
+    as_it_is = math.sqrt(_square(found, {}, 0.0))  # farther off than the case is no rotor that would fit
+    every = _ranked(found, [*slips, *_shapes(problem, found, chords)])
+    return " or ".join(s.words for s in every if s.distance < as_it_is)
 
 
 def _slips(problem: Problem, found: dict[str, float]) -> Iterator[_Slip]:
@@ -298,7 +301,7 @@ def _slips(problem: Problem, found: dict[str, float]) -> Iterator[_Slip]:
         ("pitch", f"blade angle {a:+.0f} deg (different pitch)", AsLabelled(angle_deg=a), 0.5) for a in _ANGLES_DEG
     ]
     blades = part.flow.B
-    changes += [("blades", f"{n} blades for {blades}", _Blades(n), 0.5 + math.log(n / blades) ** 2)
+    changes += [("blades", f"{number_of(n, 'blade')} for {blades}", _Blades(n), 0.5 + math.log(n / blades) ** 2)
                 for n in _BLADES if n != blades]  # fmt: skip
     yield from _shapes(problem, found, changes)
 

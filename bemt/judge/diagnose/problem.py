@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
+from bemt.data.recordings.cfd_setup import other_setup
 from bemt.judge.diagnose.blade import PLAIN, CalibratedBlade
-from bemt.judge.diagnose.record import CHANNELS, Record
+from bemt.judge.diagnose.record import CHANNELS, Record, setup_of
 from bemt.physics import effects
 from bemt.physics.bem import model as bem
 from bemt.physics.effects.base import Effect, Flow, Reading
@@ -212,6 +213,12 @@ class Problem:
     def findings(self) -> tuple[str, ...]:
         """What looks wrong in the recordings before any physics."""
         return (*self.between, *(f for p in self.parts for f in p.record.findings))
+
+    @cached_property
+    def setups_that_differ(self) -> str:
+        """How recordings were computed otherwise than their references, in words; "" where nothing says so."""
+        known, tested = ([p.record for p in self.parts if p.record.reference is which] for which in (True, False))
+        return other_setup(setup_of(tested), setup_of(known))
 
     @property
     def level(self) -> dict[str, float]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.units import ZERO_CELSIUS
+from bemt.data.recordings.cfd_setup import Conditions
 from bemt.data.recordings.channels import without_unit
 from bemt.judge.diagnose.repeats import conditions, fell, spread_sizes
 from bemt.physics.air import Air
@@ -81,6 +82,7 @@ class Record:
     electrical: bool = False  # Whether torque is electrical power over the indicated speed
     top_rpm: float = np.inf  # Fastest that the stand may run [rev/min]
     computed: bool = False  # Whether the points are those of CFD
+    setup: Conditions = field(default_factory=dict)  # How they were computed, as far as it is stated
     declared: Mapping[str, float] = field(default_factory=dict)  # Unit of the heading, by channel [its own unit]
     unitless: frozenset[str] = frozenset()  # Loads that are known by their coefficients alone
 
@@ -387,10 +389,17 @@ def merged(records: Sequence[Record]) -> Record:
         air_recorded=all(r.air_recorded for r in records), notes=_once(r.notes for r in records),
         findings=_once(r.findings for r in records), contradictions=_once(r.contradictions for r in records),
         repeatability=float(np.fmax.reduce([r.repeatability for r in records])), electrical=False,
-        top_rpm=min(r.top_rpm for r in records), computed=all(r.computed for r in records),
+        top_rpm=min(r.top_rpm for r in records), computed=all(r.computed for r in records), setup=setup_of(records),
         declared={k: v for k, v in whole.declared.items() if all(r.declared.get(k) == v for r in records)},
         unitless=frozenset.union(*(r.unitless for r in records)),
     ))  # fmt: skip
+
+
+def setup_of(records: Sequence[Record]) -> Conditions:
+    """Conditions that all computed runs state, with the values of all."""
+    stated = [r.setup for r in records]
+    names = [k for k in stated[0] if all(k in one for one in stated)] if stated else []
+    return {k: tuple(sorted({v for one in stated for v in one[k]})) for k in names}
 
 
 def _columns(records: Sequence[Record], of: str) -> dict[str, Array]:

@@ -30,7 +30,7 @@ Setting = Mapping[str, Any]
 _Column = tuple[Setting, Array, bool, float]
 
 _FINE = {1: 41, 2: 15, 3: 7}
-_LARGEST = 0.02
+_ROUNDING = 1e-9  # Over the noise of a reading. [1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +175,8 @@ def _candidate(problem: Problem, name: str, cls: type[Effect]) -> Candidate | No
             if present is None:
                 columns.append(({}, problem.signature((cls(),)), True, 1.0))
         else:
-            columns.extend(_grid(problem, cls, axes, floor))
+            for form in [{"form": f} for f in cls.words.get("form", ())] or [{}]:
+                columns.extend(_grid(problem, cls, form, axes, floor))
     lawful = [c for c in columns if all(cls(**c[0]).plausible(p.flow) for p in problem.parts if not p.record.reference)]
     kept = _merged([c for c in lawful if np.isfinite(c[1]).all()])
     if not any(np.any(np.abs(c[1]) > floor) for c in kept):
@@ -215,8 +216,10 @@ def _idle(name: str, columns: Sequence[_Column]) -> bool:
     return len(seen) < len(columns) and all(len(some) == 1 for some in seen.values())
 
 
-def _grid(problem: Problem, cls: type[Effect], axes: Sequence[Any], floor: Array) -> Iterator[_Column]:
-    """Solve at the nodes of all parameters and interpolate between them by cubic splines.
+def _grid(
+    problem: Problem, cls: type[Effect], form: Setting, axes: Sequence[Any], floor: Array
+) -> Iterator[_Column]:  # fmt: skip
+    """Solve one form of an effect at the nodes of all parameters and interpolate between them by cubic splines.
 
     Nothing is solved between corners that all change the readings by less than the floor (M,). Where a parameter has a
     usual size, settings are denser about "off": equal steps of the inverse hyperbolic sine.
@@ -227,7 +230,7 @@ def _grid(problem: Problem, cls: type[Effect], axes: Sequence[Any], floor: Array
     names = [p.name for p in axes]
 
     def solved_at(values: Sequence[float]) -> Array:
-        return problem.signature((cls(**dict(zip(names, map(float, values), strict=True))),))
+        return problem.signature((cls(**form, **dict(zip(names, map(float, values), strict=True))),))
 
     if all(np.all(np.abs(solved_at(v)) <= floor) for v in product(*(n[[0, -1]] for n in nodes))):
         return
@@ -237,9 +240,14 @@ def _grid(problem: Problem, cls: type[Effect], axes: Sequence[Any], floor: Array
         flat = table.reshape(table.shape[0], -1)
         for k, v in enumerate(product(*nodes)):
             share = float(np.prod([p.density(x) for p, x in zip(axes, v, strict=True)]))
-            yield dict(zip(names, map(float, v), strict=True)), flat[:, k], True, share
+            yield {**form, **dict(zip(names, map(float, v), strict=True))}, flat[:, k], True, share
         return
     count = _FINE.get(len(axes), 5)
+    # a parameter that moves no reading is not at work: a spline would make differences of its rounding
+    still = [k for k in range(len(axes)) if np.all(np.ptp(table, axis=k + 1).T <= _ROUNDING * problem.u)]
+    table = table[tuple([slice(None), *(0 if k in still else slice(None) for k in range(len(axes)))])]
+    axes, nodes = ([v for k, v in enumerate(some) if k not in still] for some in (axes, nodes))
+    names = [p.name for p in axes]
     fine = [_spread(p, n, count) if n.size > 2 else n for p, n in zip(axes, nodes, strict=True)]
     shares = [np.array([p.density(x) for x in f]) * (1.0 if p.usual is None else np.gradient(f))
               for p, f in zip(axes, fine, strict=True)]  # fmt: skip
@@ -252,7 +260,7 @@ def _grid(problem: Problem, cls: type[Effect], axes: Sequence[Any], floor: Array
                for n, f in zip(nodes, fine, strict=True)]  # fmt: skip
     solved = np.array([all(s) for s in product(*on_node)])
     for k, (v, w) in enumerate(zip(product(*fine), product(*shares), strict=True)):
-        yield dict(zip(names, map(float, v), strict=True)), flat[:, k], bool(solved[k]), float(np.prod(w))
+        yield {**form, **dict(zip(names, map(float, v), strict=True))}, flat[:, k], bool(solved[k]), float(np.prod(w))
 
 
 def _spread(p: Parameter, nodes: Array, count: int) -> Array:

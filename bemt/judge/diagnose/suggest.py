@@ -17,11 +17,12 @@ from bemt.base.units import ZERO_CELSIUS, suffixes
 from bemt.data.readers.recording_toml import QUANTITIES
 from bemt.data.recordings.shown import options_of
 from bemt.judge.compare.change_document import AIR_OF_BOTH, DAYS, title_of
+from bemt.judge.compare.one_run import other_fluid
 from bemt.judge.diagnose import noise
 from bemt.judge.diagnose.assemble import assemble
 from bemt.judge.diagnose.form import ALIKE
 from bemt.judge.diagnose.problem import Part, Problem
-from bemt.judge.diagnose.record import STILL, Record
+from bemt.judge.diagnose.record import CHANNELS, STILL, Record
 from bemt.judge.diagnose.repeats import conditions
 from bemt.judge.diagnose.signatures import actual_unit, effect_of
 from bemt.judge.loss import minutes
@@ -236,6 +237,8 @@ def _extended(alone: Problem, option: _Option) -> Problem:
 def _of_cfd(found: Evidence) -> Suggestion:
     """What a study of CFD has for a next run: no stand, no other specimen, a set-up that may move the loads itself."""
     part = found.problem.parts[0]
+    if not part.record.air_recorded and (fluid := _other_fluid(found.problem)):
+        return Suggestion(fluid, (), (), 0.0, 0.0, "cfd")
     steps = ["a finer grid (cells x 2 or more)", "a larger domain"]
     steps += ["compressible air"] if float(np.max(part.flow.M_tip)) > _COMPRESSIBLE else []
     fastest = int(np.argmax(part.record.rpm))
@@ -244,6 +247,18 @@ def _of_cfd(found: Evidence) -> Suggestion:
         f"one point again, {point['rpm']:.0f} rev/min, with {', with '.join(steps)}: what moves the loads is the set-up"
     )
     return Suggestion(text, (point,), (), 0.0, 0.0, "cfd")
+
+
+def _other_fluid(problem: Problem) -> str:
+    """Another fluid in which the loads would be those of the case, as far as rotors are known; "" where none is."""
+    off, u = [], []
+    for k, name in enumerate(CHANNELS[:2]):
+        mine = np.flatnonzero((problem.channel == k) & problem.free)
+        if problem.level.get(name, -1.0) > -1.0:
+            off.append(np.log1p(problem.level[name]))
+            shares = problem.of_real_rotors[np.ix_(mine, mine)] / np.outer(problem.f0[mine], problem.f0[mine])
+            u.append(float(np.sqrt(np.mean(shares))))
+    return other_fluid(off, u, float(np.median(problem.parts[0].flow.rho)))
 
 
 def _points(record: Record, option: _Option) -> tuple[dict[str, float], ...]:
@@ -382,7 +397,7 @@ def suggest(found: Evidence, rivals: Sequence[Rival], unknown: float = 0.0, refe
     able = [c for c in choices if c.gain * total >= _WORTH and (c.kind == "reference" or c.after >= _ENOUGH)]
     able.sort(key=lambda c: -c.gain / c.minutes)
     certain = before >= _ENOUGH and not reference
-    looked = look(names, part.record)
+    looked = look(names if total >= _WORTH else names[:1], part.record)  # without doubt there is no rival to rule out
     worth = [c for c in choices if c.kind == "run" and c.gain * total >= _WORTH]
     # where no run is able to, one that tells only the others apart is better than nothing
     instead = looked or max(worth, key=lambda c: c.gain / c.minutes, default=None)

@@ -19,7 +19,7 @@ from bemt.base.arrays import Array
 from bemt.judge.proof.stand import StandErrors, StandMotor
 from bemt.judge.proof.truth import TruthRotor
 from bemt.judge.proof.truth_section import TrueSection
-from bemt.judge.proof.truth_world import Conditions, TruthDuct, World
+from bemt.judge.proof.truth_world import Conditions, TruthDuct, World, torsion
 
 OPEN_PLANS = ("static_sweep", "grid_shuffled", "grid_ordered", "two_air", "wall", "endurance", "transient")
 DUCTED_PLANS = ("static_sweep", "grid_shuffled", "two_air", "gap", "endurance")
@@ -247,7 +247,8 @@ def _untwist(f: float, rig: Rig, c: Conditions, rng: np.random.Generator) -> Cha
     turn = 1.4 * f * _sign(rng)
     kelvin = c.temperature_C + 273.15
     at = float(np.max(c.pressure_Pa / (287.05 * kelvin) * (c.rpm * np.pi / 30.0) ** 2))
-    return Change(world={"untwist": turn, "untwist_at": at}, parameters={"tip_deg": (-turn, "deg")})
+    there = float(np.interp(0.75, rig.rotor.x, torsion(rig.rotor)))
+    return Change(world={"untwist": turn, "untwist_at": at}, parameters={"turn_deg": (-turn * there, "deg")})
 
 
 def _inertia(f: float, rig: Rig, c: Conditions, rng: np.random.Generator) -> Change:

@@ -253,7 +253,7 @@ class TrueLoads:
     answer: truth.TrueAnswer  # What the rotor does, to begin another solution from
 
 
-def _torsion(rotor: truth.TruthRotor) -> Array:
+def torsion(rotor: truth.TruthRotor) -> Array:
     """Turn along the blade over that of the tip: moment ~ chord^2 r^2 gathered from the tip, stiffness ~ chord^4."""
     x, c, dx = rotor.x, rotor.chord / rotor.radius, np.diff(rotor.edges)
     moment = np.cumsum((c**2 * x**2 * dx)[::-1])[::-1]
@@ -301,7 +301,7 @@ def loads(
     area = np.pi * rotor.radius**2
     shape = (c.rpm.size, rotor.x.size)
     twist = np.full(shape, np.radians(world.pitch_offset))
-    twist = twist + np.radians(world.untwist) * np.outer(rho * omega**2 / world.untwist_at, _torsion(rotor))
+    twist = twist + np.radians(world.untwist) * np.outer(rho * omega**2 / world.untwist_at, torsion(rotor))
     around = truth.Around(twist=twist)
     span = (1.0 - rotor.hub) * rotor.radius
     leak = np.zeros(c.rpm.size)

@@ -104,7 +104,11 @@ def plot(d: Dataset, x: str | None = None, y: Sequence[str] = (), ax: Any = None
             if np.any(u > 0.0) and points:
                 ax.errorbar(at, value, np.nan_to_num(u), fmt="none", ecolor=line.get_color(), lw=1)
             elif np.any(u > 0.0):
+                # a band that is wider than all values, as an efficiency's near no thrust, leaves the frame
+                low, high = ax.get_ylim()
                 ax.fill_between(at, value - u, _top(d, channel, rows), alpha=0.2, color=line.get_color(), lw=0)
+                (below, above), most = ax.get_ylim(), 0.5 * (high - low)
+                ax.set_ylim(max(below, low - most), min(above, high + most))
     ax.set_xlabel(x)
     ax.set_ylabel(", ".join(wanted))
     if not beside:

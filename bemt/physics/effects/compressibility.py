@@ -38,9 +38,7 @@ class Compressibility(Effect):
 
     id = "compressibility"
     title = "compressibility (lift)"
-    sign = (
-        "thrust coefficient grows as 1 + M^2/2 of the tip; depends on air temperature at the same speed, not on density"
-    )
+    sign = "thrust coefficient grows by about M^2/6 of the tip; depends on air temperature at the same speed, not on density"
     words = {"form": FORMS}
     parameters = (
         Parameter("amplitude", "1", 0.6, 1.4, "1 is the published form; those differ by a fifth", 5, 0.0),

@@ -29,6 +29,7 @@ class CrossTalk(Effect):
     sign = "one channel follows the load of the other over advance ratio; the sign reverses with the sense of rotation"
     kind = "stand"
     fault = "cross-talk"
+    sensor = "torque_Nm"
     words = {"form": FORMS}
     parameters = (Parameter("k", "1", -0.2, 0.2, "declared, arm error of R/20, seldom R/5", off=0.0, usual=0.05),)
     tried = {"form": FORMS, "k": tuple(k / 100.0 for k in range(-20, 21) if k)}

@@ -39,6 +39,11 @@ class SupplyVoltage(Effect):
     )
     on_by_default = False
 
+    def applies(self, flow: Flow) -> str:
+        """Not where the voltage is recorded beside the usual one: what it says is `battery_sag`."""
+        known = "the recording has voltage_V" if {"voltage_V", "usual_voltage_V"} <= flow.extra.keys() else ""
+        return super().applies(flow) or known
+
     def reading(self, reading: Reading, flow: Flow) -> None:
         """Change the speed that the pulse width gives."""
         if "rpm" not in reading.values:

@@ -8,21 +8,27 @@ import numpy as np
 
 from bemt.physics.effects.base import Array, Effect, Flow, Parameter, RotorBuild
 
+FORMS = ("centrifugal", "aerodynamic")
+
 
 @dataclass(frozen=True)
 class Untwist(Effect):
-    """Blade that twists under load: d beta = -tip_deg (r/R)^2 at the hardest point, in proportion to rho Omega^2.
+    """Blade that twists under load as a rod, by ``turn_deg`` nose down at 0.75 R at the hardest point.
 
     Notes
     -----
-    Centrifugal and aerodynamic moments twist a flexible blade as the square of the speed (Sodja, Drazumeric, Kosel and
-    Marzocca 2014, J. Aircraft 51:117, not checked); shape and proportion to rho Omega^2 are declared. The centrifugal
-    ("propeller") moment turns sections towards flat pitch, that of cambered sections the nose down, lift ahead of the
-    elastic axis the nose up. Positive: nose down (untwist). Parameters refer to the point with the
-    largest rho Omega^2 of a recording; see :meth:`share`; without a recording they apply directly.
+    d/dr (GJ d theta/dr) = -m, held at the hub and free at the tip (J. C. Houbolt and G. W. Brooks, NACA Report 1346,
+    1957; not checked against the report): the turn levels off where the load ends. Thin sections of one material: GJ ~
+    c^4 (t/c)^3. ``form = "centrifugal"``: m ~ c^4 (t/c) sin beta cos beta, the "propeller moment", towards flat pitch;
+    the larger one in a solid plastic blade. ``form = "aerodynamic"``: m ~ r^2 c^2, of camber (nose down) or of lift
+    ahead of the elastic axis (nose up). Both grow as Omega^2; so does the turn, and its proportion to rho Omega^2 is
+    declared. It is told where loads show it; the tip turns 1.03 to 1.6 times that, by planform and form. Parameters
+    refer to the point with the largest rho Omega^2 of a recording; see :meth:`share`; without a recording they apply
+    directly.
     """
 
-    tip_deg: float = 1.0
+    turn_deg: float = 0.6
+    form: str = "centrifugal"
 
     id = "untwist"
     geometric = True
@@ -33,14 +39,18 @@ class Untwist(Effect):
         "thrust coefficient falls (or rises) with rho Omega^2 and not with Mach number: depends on density at the "
         "same speed, not on air temperature"
     )
-    parameters = (
-        Parameter("tip_deg", "deg", -4.0, 5.0, "declared; plastic blades 1 to 3 deg either way", 7, 0.0, 1.5),
-    )
+    words = {"form": FORMS}
+    parameters = (Parameter("turn_deg", "deg", -2.5, 3.0, "declared; tips of plastic blades 1 to 3 deg", 7, 0.0, 0.85),)
     on_by_default = False
 
     def blade(self, bake: RotorBuild) -> None:
         """Twist the blade."""
-        bake.beta = bake.beta - np.radians(self.tip_deg) * bake.level * (bake.r / bake.R) ** 2
+        c, thin = bake.chord, bake.thickness
+        m = bake.r**2 * c**2 if self.form == "aerodynamic" else c**4 * thin * np.sin(bake.beta) * np.cos(bake.beta)
+        torque = np.cumsum((m * bake.dr)[::-1])[::-1]
+        turn = np.cumsum(torque / (c**4 * thin**3) * bake.dr)
+        there = np.interp(0.75 * bake.R, bake.r, turn)
+        bake.beta = bake.beta - np.radians(self.turn_deg) * bake.level * turn / there
         bake.level = 1.0  # it was meant for this effect, not for one that comes later
 
     def share(self, flow: Flow) -> Array:
