@@ -149,7 +149,8 @@ def misread(facts: Facts) -> Iterator[Finding]:
             times = lone(rpm[rows], size[rows])
         else:
             rows = np.flatnonzero(good & np.isfinite(flow) & np.isfinite(v))
-            times = lone(rpm[rows], v[rows] * float(np.sign(np.median(v[rows]))), flow[rows])
+            sense = float(np.sign(np.sum(v[rows])))  # of no row: 0
+            times = lone(rpm[rows], v[rows] * sense, flow[rows])
         for i, off in zip(rows[times != 1.0].tolist(), times[times != 1.0].tolist(), strict=True):
             at = f"{rpm[i]:.0f} rev/min"
             at += "" if flow is None else f" and J {flow[i]:.2g}" if V is None else f" and {V[i]:.3g} m/s"

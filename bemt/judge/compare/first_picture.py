@@ -69,8 +69,8 @@ class PredictionView:
     def width(self, channel: str) -> float:
         """Half the 95 % band at the points, median, over the prediction there [1]."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            shares = [np.abs(m.u[channel] / m[channel]) for m in self._beside(channel)]
-        return float(np.nanmedian(np.concatenate(shares)))
+            shares = np.concatenate([np.abs(m.u[channel] / m[channel]) for m in self._beside(channel)])
+        return float(np.median(shares[np.isfinite(shares)])) if np.isfinite(shares).any() else float("nan")
 
     def _beside(self, channel: str) -> list[Dataset]:
         return [m for r, m in zip(self.recorded, self.model, strict=True) if channel in r]

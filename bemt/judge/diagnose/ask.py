@@ -245,8 +245,9 @@ def _inside(records: Sequence[Record], cases: Sequence[Case]) -> str:
     counts = [view.inside(c)[:2] for c in view.channels]
     if more or any(n != total for n, total in counts) or not any(t for _, t in counts):
         return ""
-    wide = " and ".join(f"{100.0 * view.width(c):.0f} %" for c in view.channels)
-    hides = "" if any(r.reference for r in records) else f" (± {wide} wide: a level inside it tells nothing)"
+    wide = " and ".join(f"{100.0 * w:.0f} %" for w in map(view.width, view.channels) if np.isfinite(w))
+    alone = wide and not any(r.reference for r in records)
+    hides = f" (± {wide} wide: a level inside it tells nothing)" if alone else ""
     return view.sentence.partition(";")[0].rstrip(".") + f"{hides}."
 
 

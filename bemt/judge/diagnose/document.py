@@ -348,7 +348,8 @@ def _of_class(d: Diagnosis) -> str:
         return f"{len(titles)} causes look alike in these readings: {families(said.effects)}"
     chance, lead = d.found.probability.get(said.leading, 0.0), [i for i in said.leading if i in said.effects]
     if len(lead) == 1:  # the likeliest, with its size
-        titles = [f"{_with_size(d, lead[0])} [{chance:.2f}]", *(_title(d, i) for i in said.effects if i not in lead)]
+        others = (_title(d, i) for i in said.effects if i not in lead)
+        titles = [f"{_with_size(d, lead[0])}, probability {chance:.2f},", *others]
     return f"The cause is {' or '.join(titles)}; these readings cannot distinguish them"
 
 
@@ -411,10 +412,12 @@ def text(d: Diagnosis, details: bool = False, lead: str = "") -> str:
              textwrap.wrap(line, 110, initial_indent="  ", subsequent_indent="    ")
              for line in rest if line not in last}  # fmt: skip
     if not details:
-        left = _LINES - len(out) - sum(len(shown.get(line, ())) for line in steps)
+        warned = [line for line in shown if line.startswith("Before any physics: ")][:1]
+        sure = [*warned, *(line for line in shown if line in steps)]
+        left = _LINES - len(out) - sum(len(shown[line]) for line in sure)
         for line, wrapped in shown.items():
-            told = line in steps or (not line.startswith(_DETAILS) and len(wrapped) <= left)
-            left -= len(wrapped) if told and line not in steps else 0
+            told = line in sure or (not line.startswith(_DETAILS) and len(wrapped) <= left)
+            left -= len(wrapped) if told and line not in sure else 0
             out += wrapped if told else []
         return "\n".join(out)
     out += [line for wrapped in shown.values() for line in wrapped]

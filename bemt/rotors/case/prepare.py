@@ -63,13 +63,10 @@ def _effects(case: Case) -> tuple[effects.Effect, ...]:
                 except ValueError as error:
                     got, _, expected = str(error).partition("; expected ")
                     faults.append(Fault(case.path.as_posix(), where, got, expected))
-    off = set(case.file.model.effects_off)
-    faults += [
-        Fault(case.path.as_posix(), "model.effects_on", name, "not in effects_off, too") for name in on if name in off
-    ]
     refuse(faults)
     if (duct := case.file.duct) is not None and duct.gap_loss is not None:
         on.setdefault("tip_gap", TipGap(loss=duct.gap_loss))
+    off = set(case.file.model.effects_off)
     standard = {effect.id for effect in effects.standard()}
     return tuple(on.get(name) or cls() for name, cls in known.items() if name in (standard | set(on)) - off)
 

@@ -17,7 +17,6 @@ import numpy as np
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.units import UNITS, split_suffix
 from bemt.physics.air import Air
-from bemt.rotors.as_measured import FAR, as_measured
 from bemt.rotors.case.as_built import MOVED, CaseAsBuilt, as_built_of
 from bemt.rotors.conditioning import SESSION, apart
 from bemt.rotors.measured import records
@@ -158,6 +157,8 @@ def conditioned(case: Case, text: str) -> CaseAsBuilt:
     readings = parse_reading(text, "blade.as_built.reading")
     stated = case.file.blade.as_built
     known = records()[stated.measured] if stated is not None and stated.measured is not None else None
+    from bemt.rotors.as_measured import FAR, as_measured
+
     blade = case.file.blade.model_copy(update={"as_built": None, "known_from": _source_before(case)})
     base = replace(case, file=case.file.model_copy(update={"blade": blade}))
     rows = np.array([[r.rpm, r.airspeed_m_s, r.thrust_N, r.torque_Nm, r.density_kg_m3] for r in readings]).T
