@@ -346,6 +346,8 @@ def test_pole_pairs_that_are_the_next_winding_are_named_by_their_ratio(tmp_path:
     assert next(iter(answer.document["subsystems"]["drive"]["ranking"]), {"effect": "none"})["effect"] == "none"
     if driven:
         assert answer.effects[0] == "rpm_scale" and "no change beyond scatter" not in answer.text
+        first = compare(*files, case=CASES / "prop_10x5").document["ranking"][0]  # nor does a case unsay it
+        assert first["effect"] == "rpm_scale" and first["probability"] > 0.8
 
 
 def test_stairs_of_few_steps_are_no_ramp(tmp_path: Path) -> None:

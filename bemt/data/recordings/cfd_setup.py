@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from bemt.base.tables import number_text
+from bemt.data.readers import number
 from bemt.data.readers.references import Reference
 from bemt.data.recordings.audit import AuditLine, audit, facts_of, number_or
 from bemt.physics.dataset import Dataset
@@ -203,8 +204,9 @@ def _alike(name: str, a: tuple[str, ...], b: tuple[str, ...]) -> bool:
     if set(a) == set(b):
         return True
     if name in ("cells", "y_plus", "domain_over_D"):
-        ends = ([float(f(float(v.replace(",", "")) for v in one)) for f in (min, max)] for one in (a, b))
-        return all(abs(x - y) <= _LIKE_CELLS * max(abs(x), abs(y)) for x, y in zip(*ends, strict=True))
+        sizes = ([number(v.replace(",", "")) or math.nan for v in one] for one in (a, b))  # words are not alike
+        ends = zip(*((min(one), max(one)) for one in sizes), strict=True)
+        return all(abs(x - y) <= _LIKE_CELLS * max(abs(x), abs(y)) for x, y in ends)
     return False
 
 
