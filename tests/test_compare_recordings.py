@@ -225,6 +225,9 @@ def test_runs_of_cfd_with_other_set_ups_name_no_physics_and_no_cell(tmp_path: Pa
     assert "turbulence SST and laminar" in other.text and "one set-up" in other.document["next_measurement"]["text"]
     assert not {"torque_gain", "torque_zero", "cross_talk"} & {r["effect"] for r in same.document["ranking"]}
     assert "both days" not in same.text
+    bench = [written(tmp_path / f"{k}.csv", {**t, "wall": np.full(17, n), "cells": np.full(17, 4.0)})
+             for k, t, n in (("d", a, 1.0), ("e", b, 2.0))]  # fmt: skip
+    assert "torque_gain" in {r["effect"] for r in compare(*bench).document["ranking"]}, "of a battery and a wall"
 
 
 def test_recorded_density_is_the_cause_when_the_coefficients_agree(tmp_path: Path) -> None:

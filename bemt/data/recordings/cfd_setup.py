@@ -170,6 +170,12 @@ def conditions_of(d: Dataset) -> Conditions:
     return out
 
 
+def stated_setup(d: Dataset) -> Conditions:
+    """Conditions of what was computed: a run of CFD, or a table that states solver, turbulence or cells; else {}."""
+    found = conditions_of(d)
+    return found if d.kind == "cfd" or {"turbulence", "cells", "solver"} & found.keys() else {}
+
+
 def _text(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"

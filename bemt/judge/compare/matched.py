@@ -109,7 +109,7 @@ def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> 
         _shifts(series, bool(ramp)),
         (int(false.sum()) + len(gone), (int(np.isfinite(series.rpm).sum()) if "rpm" in series else 0) + len(gone)),
         math.nan if (zero := wind_of(imported)) is None else zero,
-        cfd_setup.conditions_of(imported),
+        cfd_setup.stated_setup(imported),
     )
 
 

@@ -32,6 +32,7 @@ from bemt.data.recordings.cfd_setup import (
     faults_first,
     floor_note,
     grid_floor,
+    stated_setup,
 )
 from bemt.data.recordings.channels import named, without_unit
 from bemt.physics.dataset import Dataset
@@ -175,7 +176,7 @@ def compare_run(
         angle_deg=_angle(full, rows, made, name), progress=step,
     )  # fmt: skip
     solved = whole.points
-    computed = imported.kind == "cfd" or bool(conditions_of(imported))
+    computed = imported.kind == "cfd" or bool(stated_setup(imported))
     if not computed and (open_u := [k for k in STAND_U if k in full and np.isnan(full.u[k][rows]).any()]):
         usual = ", ".join(f"{k.rsplit('_', 1)[0]} {STAND_U[k]:.0%}" for k in open_u)
         notes.insert(

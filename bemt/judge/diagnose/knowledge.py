@@ -22,8 +22,7 @@ from bemt.data.recordings.load import import_file
 from bemt.judge.compare import drive_laws
 from bemt.judge.compare.matched import StandRun, stand_run
 from bemt.judge.compare.recordings import RunChange, changed
-from bemt.judge.diagnose import other_rotor, record
-from bemt.judge.diagnose.along_blade import RIGID
+from bemt.judge.diagnose import along_blade, other_rotor, record
 from bemt.judge.diagnose.record import merged
 from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation, KindPrior
 from bemt.physics import effects
@@ -141,7 +140,7 @@ def possible(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Candida
     unread |= {"torque_Nm"} if any(r.electrical for r in tested) else set()
     bare = frozenset[str]().union(*(r.unitless for r in tested))
     # what is computed comes from no cell and no anemometer, of stiff blades; its units and its speed were typed in
-    stiff = RIGID if all(r.computed for r in tested) else ()
+    stiff = along_blade.RIGID if all(r.computed for r in tested) else ()
     unread_by = unread | ({"thrust_N", "torque_Nm", "airspeed_m_s"} if stiff else set())
     able = (c for c in candidates if effects.catalogue()[c.id].sensor not in unread_by and c.id not in stiff)
 

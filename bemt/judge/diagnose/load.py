@@ -67,7 +67,7 @@ def load(
     """Read one recording, whatever its format."""
     from bemt.data.recordings.cfd_options import filled
     from bemt.data.recordings.cfd_run import is_run, run_at
-    from bemt.data.recordings.cfd_setup import conditions_of, one_grid
+    from bemt.data.recordings.cfd_setup import one_grid, stated_setup
     from bemt.data.recordings.load import import_file
     from bemt.data.recordings.reduce import reduce, reduction
 
@@ -76,7 +76,7 @@ def load(
     if imported is None:
         imported = import_file(path)
         imported = filled(imported, rpm, airspeed_m_s, density_kg_m3) if is_run(imported) else imported
-    setup = conditions_of(imported)
+    setup = stated_setup(imported)
     if not is_run(imported):
         _one_setup(imported, path)
         one_rotor(imported, path, "`compare A B --rows-b rotor={} --case CASE` takes one of them")
