@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from pathlib import Path
 
@@ -29,7 +30,11 @@ def test_a_station_off_the_line_between_its_neighbours_is_refused(
 ) -> None:
     (here / "odd.csv").write_text(STATIONS.replace("0.75,0.16,15", "0.75,0.16,51"))
     assert main(["new", "odd", "--stations", "odd.csv", "--diameter-mm", "254"]) == 2
-    assert "odd.csv: 4:3: got 51; expected about 16" in capsys.readouterr().err
+    assert "odd.csv: 4:3: got 51; expected about 14" in capsys.readouterr().err
+    # three stations of one pitch are a screw, however steep its root
+    screw = "".join(f"{x},0.15,{math.degrees(math.atan2(0.4, math.pi * x)):.6g}\n" for x in (0.05, 0.35, 1.0))
+    (here / "screw.csv").write_text(f"r_over_R,chord_over_R,beta_deg\n{screw}")
+    assert main(["new", "screw", "--stations", "screw.csv", "--diameter-mm", "254"]) == 0
 
 
 def test_a_folder_that_exists_is_said_to(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -139,19 +139,18 @@ def as_measured(
     off = target - at.f.reshape(-1) - bias
     far = float(np.max(np.abs(_off_by(prior, at, off, noise, mine)), initial=0.0))
     thirst = float(np.max(_off_by(prior, at, off, noise, rows["torque"]), initial=0.0))
-    z = prior.mean
-    for _ in range(MOST_PASSES):
+    z, settled, passes = prior.mean, False, 0
+    while passes < MOST_PASSES and not settled:
+        passes += 1
         found = condition(
             lambda z, b=bias: solve(z, rpm_, J_, points).reshape(-1) + b,  # type: ignore[misc]
-            prior, target, noise, people.rest_sizes, WEIGHTS,
+            prior, target, noise, people.rest_sizes, WEIGHTS, start=z,
         )  # fmt: skip
-        there = np.abs(found.mean - z) <= TOLERANCE * np.sqrt(np.diag(found.cov))
+        settled = bool(np.all(np.abs(found.mean - z) <= TOLERANCE * np.sqrt(np.diag(found.cov))))
         z = found.mean
         at, bias, noise = sensed(z)  # as predictions will see it
-        if there.all():
-            break
     slopes = at.T.transpose(0, 2, 1).reshape(target.size, -1)
-    found = replace(found, at=z, f=at.f.reshape(-1) + bias, T=slopes)
+    found = replace(found, at=z, f=at.f.reshape(-1) + bias, T=slopes, converged=found.converged and settled)
     posterior = Prior(found.mean, found.cov, np.ones(1), np.ones(1), "reference")
     reference = ReferenceRun.given(at, noise, target, found)
     return AsMeasured(prior, posterior, reference, found, int(keep.size), times, far, thirst)

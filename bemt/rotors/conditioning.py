@@ -50,8 +50,9 @@ class Conditioned:
 def condition(
     solve: Readings, prior: Prior, y: Array, noise: Array, noise_sizes: Array | None = None,
     noise_weights: Array | None = None, tolerance: float = TOLERANCE, most: int = MOST_STEPS,
+    start: Array | None = None,
 ) -> Conditioned:  # fmt: skip
-    """Posterior of a rotor's latent numbers from readings of a reference run.
+    """Posterior of a rotor's latent numbers from readings of a reference run; the search begins at ``start``.
 
     Notes
     -----
@@ -63,7 +64,7 @@ def condition(
     not checked): a run that fits no rotor moves none. The ratio is of readings to each other, so one alone has none: it
     is this rotor's.
     """
-    z = np.array(prior.mean, dtype=float)
+    z = np.array(prior.mean if start is None else start, dtype=float)
     f = np.asarray(solve(z), dtype=float)
     kept = np.isfinite(f) & np.isfinite(y)
     if not kept.any() or noise.shape != (y.size, y.size) or f.shape != y.shape:
@@ -99,7 +100,7 @@ def condition(
         left = np.linalg.solve(white, target - f[kept] - T[kept] @ (here.mean - z))
         excess = float(left @ left) / (left.size * largest**2)
         if excess > BIRGE:
-            again = condition(solve, prior, y, excess * noise, noise_sizes, noise_weights, tolerance, most)
+            again = condition(solve, prior, y, excess * noise, noise_sizes, noise_weights, tolerance, most, z)
             return replace(again, excess=excess * again.excess)
     return Conditioned(
         here.mean, here.cov, z, f, T, prior.sizes, here.weights, steps, converged, here.noise_size, here.log_evidence

@@ -239,8 +239,8 @@ class RotorEstimate(Dataset):
         notes = ["± 68 and 95 %: the rotor itself; on a stand: what yours may show, ± 68 %"]
         if g.source:
             notes.append(f"as measured: {g.source}")
-        if g.known_from == "label" and g.series is None and (open_ := fresh.open_kind(g.label, g.blades)):
-            notes += [open_, self._by_kind()]
+        if self._open_kind:
+            notes.append(f"{self._open_kind}; --details says by how much")
         if g.pitch_in > SWAPPED * g.diameter_in:
             notes.append(f"! a label is diameter x pitch: is it {g.pitch_in:g}x{g.diameter_in:g}?")
         notes += [f"! {flag}" for flag in counted([list(flags) for flags in self.flags])]
@@ -251,6 +251,17 @@ class RotorEstimate(Dataset):
             notes.append(f"for narrower bands give {' or '.join(more)}")
         return "\n".join([read, text_table(head, cells, left=()), *notes]) + "\n"
 
+    @property
+    def _open_kind(self) -> str:
+        """What a label leaves open that states no kind of blade; else empty."""
+        g = self.given
+        return fresh.open_kind(g.label, g.blades) if g.known_from == "label" and g.series is None else ""
+
+    @property
+    def details(self) -> str:
+        """The same, and what each ending of an open label would give."""
+        return f"{self.text}{self._by_kind()}\n" if self._open_kind else self.text
+
     def _by_kind(self) -> str:
         """Thrust of the first row as each kind of blade that an ending tells."""
         g, at = self.given, [self.columns[k][:1] for k in ("rpm", "airspeed_m_s", "angle_deg")]
@@ -259,7 +270,7 @@ class RotorEstimate(Dataset):
             case = case_of_label(f"{g.label} {end}", g.blades, g.chord_mm, g.measured_pitch_in, None, g.density_kg_m3)
             found = propagate(case, at[0], at[1], angle_deg=at[2], bands=False).points
             shown.append(f"{end} {number_text(found.thrust_N[0], 3)}")
-        return f"with one, T at {speed_text(at[0][0])} rev/min: {', '.join(shown)} N"
+        return f"with an ending, T at {speed_text(at[0][0])} rev/min: {', '.join(shown)} N"
 
     def __str__(self) -> str:
         return in_words(self.text)
