@@ -74,7 +74,7 @@ def test_a_named_effect_has_a_step_and_a_command(compared: chain.Diagnosis) -> N
 def test_a_recording_that_contradicts_itself_is_mended_first(grid: dict[str, np.ndarray]) -> None:
     wrong = "log.csv: error: power_above_input (torque x speed): 1.5 times. Correction: unit or gain of the torque"
     problem = cast("chain.Problem", SimpleNamespace(findings=(wrong,), scatter={}, level={"thrust_N": 0.0}, parts=(),
-                                                     setups_that_differ=""))  # fmt: skip
+                                                     other_setup=""))  # fmt: skip
     found = SimpleNamespace(problem=problem, probability={UNKNOWN: 0.98, NONE: 0.02})
     said = loss.decide(knowledge.combined(cast("posterior.Evidence", found)))
     assert said.verdict == "insufficient"

@@ -48,6 +48,18 @@ def test_diagnose_compare_and_the_library_agree(
         assert said[0][0] == "none"
 
 
+def test_a_report_beside_a_reference_says_what_diagnose_says(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    a, b = written(tmp_path / "a.csv", 1, 1.0, 1.0), written(tmp_path / "b.csv", 2, *CHANGES[1])
+    assert main(["diagnose", b, "--reference", a, "--case", CASE, "--json"]) == EXIT_OK
+    said = json.loads(capsys.readouterr().out)
+    out = tmp_path / "out"
+    assert main(["report", CASE, "--recording", b, "--reference", a, "--out", str(out), "--quiet"]) == EXIT_OK
+    told = json.loads((out / "prop_8x5" / "diagnosis" / "diagnosis.json").read_text(encoding="utf-8"))
+    assert not {k for k in ("verdict", "effects", "probability", "next_measurement") if told[k] != said[k]}
+
+
 @pytest.mark.parametrize(("word", "said"), [
     ("nowhere/prop_8x5", "no such file or folder"), ("10x5.toml", "no such file or folder"),
     ("nix", "no folder or case of this name, and no label"), ("10x5ZZ", "label"),

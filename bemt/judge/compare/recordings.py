@@ -97,7 +97,7 @@ class RunChange:
         said = decide(P)
         return Judgement.of(replace(said, why=self.no_speed) if said.by == "files" else said, P)
 
-    @property
+    @cached_property
     def _bare(self) -> list[tuple[MatchedChannel, fits.Scatter]]:
         """Thrust at what stands for the speed, with its scatter: at equal power, at equal command and known voltage."""
         runs, volts = [self.rotor], [r.points.values.get("voltage_V") for r in (self.a, self.b)]

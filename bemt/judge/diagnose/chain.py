@@ -246,7 +246,7 @@ def _settling(found: posterior.Evidence, decision: loss.Decision, best: fitting.
     if decision.verdict == "none":
         faint = rivals_of(["", *singles][:_MOST_RIVALS])
         return suggestion.nothing_called_for(found, faint, found.probability[UNKNOWN])
-    if decision.by == "files" and found.problem.setups_that_differ:
+    if decision.by == "files" and found.problem.other_setup:
         return suggestion.Suggestion(ONE_SETUP, (), (), 0.0, 0.0, "cfd")
     if decision.verdict == "insufficient" and (mend := other_rotor.to_mend(found.problem)):
         return suggestion.mended(found, mend)

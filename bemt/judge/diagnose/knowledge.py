@@ -139,10 +139,10 @@ def possible(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Candida
     unread = set() if any(r.air_recorded for r in tested) else {"density_kg_m3"}
     unread |= {"torque_Nm"} if any(r.electrical for r in tested) else set()
     bare = frozenset[str]().union(*(r.unitless for r in tested))
-    # what is computed comes from no cell and no anemometer, of stiff blades; its units and its speed were typed in
-    stiff = along_blade.RIGID if all(r.computed for r in tested) else ()
-    unread_by = unread | ({"thrust_N", "torque_Nm", "airspeed_m_s"} if stiff else set())
-    able = (c for c in candidates if effects.catalogue()[c.id].sensor not in unread_by and c.id not in stiff)
+    unsensed, absent = unread, tuple[str, ...]()
+    if all(r.computed for r in tested):  # by no cell and no anemometer, of stiff blades; units and speed were typed in
+        unsensed, absent = unread | {"thrust_N", "torque_Nm", "airspeed_m_s"}, along_blade.RIGID
+    able = (c for c in candidates if effects.catalogue()[c.id].sensor not in unsensed and c.id not in absent)
 
     def read(setting: Mapping[str, Any]) -> bool:  # a sign needs no unit
         of = setting.get("channel")
@@ -197,8 +197,8 @@ def both(P: Mapping[Explanation, float], laws: Mapping[Explanation, float]) -> d
 
 def reason(problem: Problem, said: Decision) -> Decision:
     """The same decision; of a broken relation the relation itself is the reason, of another set-up that."""
-    if said.by == "files" and problem.setups_that_differ:
-        return replace(said, why=f"recording and reference were computed otherwise: {problem.setups_that_differ}")
+    if said.by == "files" and problem.other_setup:
+        return replace(said, why=f"recording and reference were computed otherwise: {problem.other_setup}")
     for name, finding in other_rotor.exact_faults(problem):
         if said.effects == (name,):
             return replace(said, why=f"{finding.evidence}, by definition")
@@ -209,7 +209,7 @@ def _doubted(problem: Problem, P: Mapping[Explanation, float]) -> dict[Explanati
     """Share of the fault of file or case: of what no listed cause explains where a file cannot be right, of nearly all
     where repeats differ as on no stand, another rotor is recorded, or CFD and its reference have another set-up.
     """  # noqa: D205
-    if problem.setups_that_differ:
+    if problem.other_setup:
         return shared_with_files(P, {k for k in P if k.ids or k == UNKNOWN})
     if _unlike(problem):
         return _by_level(P, other_rotor.by_level(problem))

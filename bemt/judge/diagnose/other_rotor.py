@@ -254,7 +254,7 @@ def _at_other_advance(problem: Problem, size: float) -> Array:
 
 def doubted(problem: Problem, said: Decision) -> bool:
     """Whether it is the rotor of the case that is in doubt, and not a file."""
-    elsewhere = contradiction(problem)[0] or unrepeatable(problem) or problem.setups_that_differ
+    elsewhere = contradiction(problem)[0] or unrepeatable(problem) or problem.other_setup
     return said.by == "files" and not elsewhere
 
 

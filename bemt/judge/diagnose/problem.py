@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.data.recordings.cfd_setup import other_setup
+from bemt.data.recordings import cfd_setup
 from bemt.judge.diagnose.blade import PLAIN, CalibratedBlade
 from bemt.judge.diagnose.record import CHANNELS, Record, setup_of
 from bemt.physics import effects
@@ -215,10 +215,10 @@ class Problem:
         return (*self.between, *(f for p in self.parts for f in p.record.findings))
 
     @cached_property
-    def setups_that_differ(self) -> str:
+    def other_setup(self) -> str:
         """How recordings were computed otherwise than their references, in words; "" where nothing says so."""
         known, tested = ([p.record for p in self.parts if p.record.reference is which] for which in (True, False))
-        return other_setup(setup_of(tested), setup_of(known))
+        return cfd_setup.other_setup(setup_of(tested), setup_of(known))
 
     @property
     def level(self) -> dict[str, float]:

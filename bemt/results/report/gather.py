@@ -6,6 +6,7 @@ import hashlib
 import json
 import math
 import re
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -249,6 +250,7 @@ def diagnose_into(
     from bemt.judge.diagnose.document import document
     from bemt.judge.diagnose.figures import first_picture
     from bemt.judge.diagnose.load import load_all
+    from bemt.judge.diagnose.suggest import Given
 
     cases = find_cases(paths)
     if len(cases) != 1:
@@ -259,8 +261,11 @@ def diagnose_into(
     folder.check(target, found)
     about = {"recordings": list(recordings), "cases": [c.name for c in found]}
     about |= {"references": list(references)} if references else {}
+    own, known = (tuple(map(shlex.quote, files)) for files in (recordings, references))
+    where = cases[0].parent if cases[0].name == "case.toml" else cases[0]
+    asked = Given(own, known, f"--case {shlex.quote(str(where))}")  # files say more than their points
     try:
-        answer = diagnose(records, found, None, progress)
+        answer = diagnose(records, found, None, progress, given=asked)
     except InputError as error:
         if len(recordings) > 1 or any(f.where != "readings" for f in error.faults):
             raise
