@@ -75,3 +75,19 @@ def test_a_path_is_no_label_at_the_doors_of_labels(tmp_path: Path) -> None:
     for door in (lambda: bemt.estimate(word, 6000), lambda: bemt.new(word, out=tmp_path / "a")):
         with pytest.raises(InputError, match="path is a case"):
             door()
+
+
+def test_units_that_are_stated_count_as_those_in_the_headings(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    named, bare = (tmp_path / name for name in ("named", "bare"))
+    said = []
+    for folder, stated in ((named, []), (bare, ["--unit", "thrust=N", "torque=Nm"])):
+        folder.mkdir()
+        files = [written(folder / "b.csv", 2, *CHANGES[1]), written(folder / "a.csv", 1, 1.0, 1.0)]
+        for file in files if stated else []:
+            text = Path(file).read_text("utf-8").replace("thrust_N", "thrust").replace("torque_Nm", "torque")
+            Path(file).write_text(text, "utf-8")
+        assert main(["diagnose", files[0], "--reference", files[1], "--case", CASE, *stated]) == EXIT_OK
+        said.append(capsys.readouterr().out.splitlines()[:3])
+    assert said[0] == said[1] and "against the reference" in " ".join(said[0])

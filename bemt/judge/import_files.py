@@ -174,8 +174,10 @@ def import_(
     return Told(document, text, exit_code=found.exit_code, complaints=found.complaints)
 
 
-def words(given: Mapping[str, str]) -> list[str]:
-    """``NAME=VALUE`` of a mapping; the empty name stands for all."""
+def words(given: Mapping[str, str] | Sequence[str]) -> list[str]:
+    """``NAME=VALUE`` of a mapping, in which the empty name stands for all, or as a command has them."""
+    if not isinstance(given, Mapping):
+        return [given] if isinstance(given, str) else list(given)
     return [f"{name}={value}" if name else str(value) for name, value in given.items()]
 
 

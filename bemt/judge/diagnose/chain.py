@@ -59,7 +59,6 @@ def diagnose(
     told = [(r.only(channels) if channels else r, c) for r, c in zip(records, each, strict=True)]
     loads = [(r.only(CHANNELS[:2]), c) for r, c in told if set(r.measured) - {speed}]
     turns = [(r.only((speed,)), c) for r, c in told if speed in r.measured]
-    files = (*given.references[:1], *given.recordings[:1])
     gone = {*given.ruled_out, *(() if only is None else effects.catalogue().keys() - set(only))}
 
     def judged(pair: RunChange) -> Judgement:
@@ -68,7 +67,7 @@ def diagnose(
     def compared(absent: Collection[str]) -> RunChange | None:
         if channels is not None or baseline != "bemt":
             return None
-        return change or knowledge.change_of(records, each[0].diameter_m, absent, judged, files)
+        return change or knowledge.change_of(records, each[0].diameter_m, absent, judged)
 
     def chain(
         some: Sequence[tuple[Record, Case]], ids: Sequence[str] | None,

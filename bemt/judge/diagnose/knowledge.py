@@ -9,8 +9,6 @@ tell what is unknown to the solver.
 from __future__ import annotations
 
 import math
-import os
-import shlex
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -18,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemt.base.errors import InputError
-from bemt.data.recordings.load import import_file
 from bemt.judge.compare import drive_laws
 from bemt.judge.compare.matched import StandRun, stand_run
 from bemt.judge.compare.recordings import RunChange, changed
@@ -238,15 +235,11 @@ def _by_level(P: Mapping[Explanation, float], level: Mapping[str, float]) -> dic
 
 
 def change_of(
-    records: Sequence[Record],
-    diameter_m: float,
-    absent: Collection[str],
-    judge: Callable[[RunChange], Judgement],
-    files: Sequence[str] | None = None,
-) -> RunChange | None:
+    records: Sequence[Record], diameter_m: float, absent: Collection[str], judge: Callable[[RunChange], Judgement]
+) -> RunChange | None:  # fmt: skip
     """Change of the one recording from its references; None where ratios are no measure of it.
 
-    ``absent``: effects that cannot show; ``judge`` of the loads; ``files``: reference and test as a command names them.
+    ``absent``: effects that cannot show; ``judge`` of the loads.
     """
     known, tested = [[r for r in records if r.reference is which] for which in (True, False)]
     # where the speed changes within a second the rows are no steady points
@@ -256,26 +249,20 @@ def change_of(
     sums = [[float(np.nansum(r.measured[k])) for r in pair] for k in _LOADS if all(k in r.measured for r in pair)]
     if any(a * b < 0.0 for a, b in sums):  # of a load that changed its sign, ratios are those of sizes
         return None
+    alike = all(r.whole is not None for r in pair)
     try:
-        whole = _paths(files) if len(known) == 1 else []
-        runs = [_run(r, diameter_m, f) for r, f in zip(pair, whole or (None, None), strict=True)]
+        runs = [_run(r, diameter_m, r.whole if alike else None) for r in pair]
         return changed(runs[0], runs[1], diameter_m, judge)
     except InputError:
         return None
 
 
-def _paths(files: Sequence[str] | None) -> list[str]:
-    """Files without the quotes that a command needs; none where they are not both there."""
-    names = [shlex.split(f)[0] for f in files or ()]
-    return names if len(names) == 2 and all(os.path.exists(n) for n in names) else []
-
-
-def _run(record: Record, diameter_m: float, file: str | None = None) -> StandRun:
-    """Points of a record as a comparison takes them: of its file where that is known, which says more."""
-    if file is not None:
-        whole = stand_run(import_file(file), file, diameter_m)
-        if {"airspeed_m_s", "J"} & whole.points.values.keys() or not np.any(record.V > 0.0):
-            return whole
+def _run(record: Record, diameter_m: float, whole: Dataset | None) -> StandRun:
+    """Points of a record as a comparison takes them: of its ``whole`` file where that is known, which says more."""
+    if whole is not None:
+        run = stand_run(whole, whole.file or record.name, diameter_m)
+        if {"airspeed_m_s", "J"} & run.points.values.keys() or not np.any(record.V > 0.0):
+            return run
     loads = [k for k in _LOADS if k in record.measured]
     values = {"rpm": record.rpm, "airspeed_m_s": record.V, **{k: record.measured[k] for k in loads}}
     u = {k: np.nan_to_num(record.u[k]) for k in loads}

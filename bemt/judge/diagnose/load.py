@@ -83,7 +83,7 @@ def load(
     if is_run(imported):
         run, gains = one_grid(imported)
         made = records.from_series(run, case, gains)
-        return replace(made, notes=(*made.notes, *imported.notes), computed=True, setup=setup)
+        return replace(made, notes=(*made.notes, *imported.notes), computed=True, setup=setup, whole=imported)
     imported = filled(imported, rpm, airspeed_m_s, density_kg_m3)
     speed_in_doubt(imported, path)
     _speed_missing(imported, path)
@@ -116,7 +116,7 @@ def load(
     units = imported.provenance.get("declared", {})
     declared = {k: units[name] for k in rows.values if (name := file_name(rows, k)) in units}
     return replace(made, findings=found, contradictions=broken, notes=notes, declared=declared,
-                   computed=imported.kind == "cfd" or bool(setup), setup=setup)  # fmt: skip
+                   computed=imported.kind == "cfd" or bool(setup), setup=setup, whole=imported)  # fmt: skip
 
 
 def _speed_missing(imported: Dataset, path: str) -> None:

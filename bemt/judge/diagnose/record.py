@@ -85,6 +85,7 @@ class Record:
     setup: Conditions = field(default_factory=dict)  # How they were computed, as far as it is stated
     declared: Mapping[str, float] = field(default_factory=dict)  # Unit of the heading, by channel [its own unit]
     unitless: frozenset[str] = frozenset()  # Loads that are known by their coefficients alone
+    whole: Dataset | None = None  # As it was read, for a comparison of two recordings; None: not of one file
 
     def __len__(self) -> int:
         """Give the number of points."""
@@ -391,7 +392,7 @@ def merged(records: Sequence[Record]) -> Record:
         repeatability=float(np.fmax.reduce([r.repeatability for r in records])), electrical=False,
         top_rpm=min(r.top_rpm for r in records), computed=all(r.computed for r in records), setup=setup_of(records),
         declared={k: v for k, v in whole.declared.items() if all(r.declared.get(k) == v for r in records)},
-        unitless=frozenset.union(*(r.unitless for r in records)),
+        unitless=frozenset.union(*(r.unitless for r in records)), whole=None,
     ))  # fmt: skip
 
 

@@ -263,7 +263,7 @@ def diagnose_into(
     about |= {"references": list(references)} if references else {}
     own, known = (tuple(map(shlex.quote, files)) for files in (recordings, references))
     where = cases[0].parent if cases[0].name == "case.toml" else cases[0]
-    asked = Given(own, known, f"--case {shlex.quote(str(where))}")  # files say more than their points
+    asked = Given(own, known, f"--case {shlex.quote(str(where))}")
     try:
         answer = diagnose(records, found, None, progress, given=asked)
     except InputError as error:
