@@ -85,7 +85,7 @@ def test_every_listed_propeller_is_found_by_its_label() -> None:
         assert (hit.family, hit.blades) == (one.family, one.blades) and one.name in one.source
 
 
-@pytest.mark.parametrize("name", ["apce_10x5", "gwssf_9x7", "nr640_9_15deg_3b"])
+@pytest.mark.parametrize("name", ["apce_10x5", "apcsp_10x8", "gwssf_9x7", "nr640_9_15deg_3b"])
 def test_the_shipped_numbers_are_those_of_this_solver(name: str) -> None:
     """Else `reports/studies/measured_rotors.py` has to be run again."""
     one = records()[name]

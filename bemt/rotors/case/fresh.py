@@ -229,7 +229,7 @@ def label_text(
     open_ = (HUB, offset, chord, *section, *surface, AIR)
     values = (chord.value, section[0].value, offset.value)
     source = f"from its label. {_UNKNOWN}"
-    drag = "" if surface is SURFACE or known is not None else f"\n[model]\ndrag_level = {surface[1].value:g}\n"
+    drag = "" if surface is SURFACE else f"\n[model]\ndrag_level = {surface[1].value:g}\n"
     if known is not None:
         open_, values = (AIR,), (known.chord, known.camber, known.offset_deg)
         source = f"as measured: {known.source}.\n# The numbers are those of bemt's own fit to it."
