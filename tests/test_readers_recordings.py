@@ -502,34 +502,11 @@ def test_a_last_line_that_was_cut_is_kept_and_flagged(write: Write) -> None:
     assert np.isfinite(got["time_s"][-1]) and np.isnan(got["omega"][-1])
 
 
-# ---------------------------------------------------------------- Drive Calculator
-
-
-def laws(rows: int = 6, slip: float = 1.0) -> str:
-    out = ["myid,tbs,Name,Dia,Pitch,a,b,AltThr,TmpThr,srcThr,c,d,n10N,n100W"]
-    for k in range(rows):
-        a, b, c, d = 0.5 + 0.1 * k, 2.05, 0.005 + 0.001 * k, 3.05
-        n10 = 1000 * (10 * slip / (a * units.KGF * 1e-3)) ** (1 / b)
-        n100 = 1000 * (100 / c) ** (1 / d)
-        out.append(f"{k},4,Prop {k},{8 + k},5.0,{a:.6g},{b},200,20.0,me,{c:.6g},{d},{n10:.1f},{n100:.1f}")
-    return "\n".join(out) + "\n"
-
-
-def test_the_laws_of_drive_calculator_prove_their_units(write: Write) -> None:
-    got = importers.read(write(laws()))
-    assert got.provenance["format"] == "drivecalc" and np.allclose(got["diameter_m"], (8 + np.arange(6)) * 0.0254)
-    assert said(got, "thrust_law_N: 100.0 % of 6 rows agree") and not any(got.flags)
-    got = importers.read(write(laws(slip=units.KGF), "slip.csv"))  # 10 kgf under the heading of 10 N
-    assert said(got, "thrust_law_N: 0.0 % of 6 rows agree") and said(got, "its unit is in doubt")
-    assert all("thrust_law_N disagrees with at_10_N_rpm" in flags for flags in got.flags)
-
-
 # ---------------------------------------------------------------- mutations
 
 BASES: dict[str, str] = {
     "steps.csv": rc_text(12), "continuous.csv": rc_text(25, optical=1.0, step_s=0.02), "table.csv": table_text(),
     "raw.csv": raw_text(20), "plain.csv": plain_text(), "semicolon.csv": plain_text(";"), "bare.txt": bare_text(),
-    "laws.csv": laws(),
     "geometry.txt": "r/R c/R twist_deg\n" + "".join(f"0.{k} 0.1 {30 - k}\n" for k in range(2, 9)),
 }  # fmt: skip
 GARBAGE = [
@@ -638,7 +615,7 @@ def try_mutated(count: int, seed: int, folder: Path, bases: dict[str, str]) -> C
             outcome["refused"] += 1
             continue
         outcome[type(got).__name__] += 1
-        if isinstance(got, Dataset) and got.provenance["format"] in ("rcbenchmark", "jmajew", "table", "drivecalc"):
+        if isinstance(got, Dataset) and got.provenance["format"] in ("rcbenchmark", "jmajew", "table"):
             assert not unexplained(got, raw), (k, raw)
             assert set(got.values) | set(got.texts) and len(got.flags) == len(got)
             outcome["warned"] += bool(got.notes)
@@ -689,7 +666,7 @@ def test_every_published_file_is_imported_or_refused_with_the_reason(folder: str
             refused += 1
             continue
         read += 1
-        if isinstance(got, Dataset) and got.provenance["format"] in ("rcbenchmark", "jmajew", "table", "drivecalc"):
+        if isinstance(got, Dataset) and got.provenance["format"] in ("rcbenchmark", "jmajew", "table"):
             assert not unexplained(got, file.read_bytes()), file
             for name in got.values:
                 label = got.provenance["headings"].get(name, "") or name.replace("_", " ")
