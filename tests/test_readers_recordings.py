@@ -1085,15 +1085,7 @@ def test_a_direction_is_no_unit_of_a_force_report(write: Write) -> None:
         import_file(write(text + "blade  10 1 11 1.0 0.1 1.1\nNet  10 1 11 1.0 0.1 1.1\n", "f.txt"))
 
 
-def test_a_label_of_a_curve_may_be_bare(write: Write) -> None:
-    text = '(title "F")\n(labels "Flow Time" "cl")\n\n((xy/key/label particle-1)\n0\t1\n0.1\t2\n0.2\t3\n)\n'
-    assert "cl(particle-1)" in import_file(write(text, "f.xy")).values
-
-
 def test_a_time_in_milliseconds_is_no_clock_in_seconds(write: Write) -> None:
-    text = '(title "F")\n(labels "Flow Time (ms)" "cl")\n\n((xy/key/label "a")\n0\t1\n1\t2\n2\t3\n)\n'
-    got = import_file(write(text, "f.xy"))
-    assert got.unit("Flow Time (ms)(a)") == "ms" and "time_s(a)" not in got.values
     head = '"f"\n"Time Step" "F etc.."\n("Time Step" "F [N]" "flow-time [{}]")\n'
     body = "".join(f"{k} {1 + k / 100} {k}\n" for k in range(1, 30))
     got = import_file(write(head.format("ms") + body, "f.out"))

@@ -95,23 +95,34 @@ _IN_TEXT: tuple[_Mark, ...] = (
     (re.compile(rb"^\s*(#[^\n]*\n\s*)*FORMAT\s+type:\s*ensight", re.IGNORECASE), "an EnSight case file", _EXPORT),
     (re.compile(rb"APC Propeller .*(Predictions|RPM Range)"), "a summary of APC over many propellers (PER2)",
      "Import the propeller's own file, PER3_*.dat"),
+    (re.compile(rb"^\(\(xy/key/label", re.MULTILINE), "a Fluent XY plot", EXPORT),
     (re.compile(rb"^\s*Force vector: \(", re.MULTILINE), "a force report of Fluent 6 or older",
      "Copy its table into a CSV with units in the headings"),
 )  # fmt: skip
 
 
-def recognised(path: str | os.PathLike[str]) -> tuple[str, str] | None:
-    """Identify a file that no reader takes: what it is, and a hint; None: the reason of the readers says it."""
+def _head_of(path: str | os.PathLike[str]) -> bytes:
+    """First bytes of a file, unpacked; none of one that cannot be read."""
     try:
         with Path(part_of(path)[0]).open("rb") as stream:
             head = stream.read(16384)
-        if packed(head):
-            head = unpacked(load_bytes(path), os.fspath(path), 16384)
+        return unpacked(load_bytes(path), os.fspath(path), 16384) if packed(head) else head
     except (OSError, InputError):
-        return None
+        return b"?"
+
+
+def marked(path: str | os.PathLike[str]) -> tuple[str, str] | None:
+    """Identify a file by marks that no table of results has: what it is, and a hint; None: it has none."""
+    head = _head_of(path)
     marks = _MARKS if b"\0" in head else (*_MARKS, *_IN_TEXT)
-    if found := next(((got, hint) for mark, got, hint in marks if mark.search(head)), None):
+    return next(((got, hint) for mark, got, hint in marks if mark.search(head)), None)
+
+
+def recognised(path: str | os.PathLike[str]) -> tuple[str, str] | None:
+    """Identify a file that no reader takes: what it is, and a hint; None: the reason of the readers says it."""
+    if found := marked(path):
         return found
+    head = _head_of(path)
     if b"\0" not in head:
         return _as_text(head.decode("latin-1"))
     zeros = max(head[0:400:2].count(0), head[1:400:2].count(0))
@@ -138,7 +149,6 @@ _DAMAGED = (
     (re.compile(rb'^[^"\n,]*"(?:[ \t]+"[^"\n]*")*\)[ \t]*\r?$', re.MULTILINE), "a Fluent report file"),
     (re.compile(rb'^[^"\n,]*"[ \t]+"[^"\n]*"[ \t]*\r?\n[-+.\d]', re.MULTILINE), "a Fluent monitor"),
     (re.compile(rb"\(\([-+.\deE ]+\) \([-+.\deE ]+\)"), "an OpenFOAM forces file"),
-    (re.compile(rb"^\(\(xy/key/label", re.MULTILINE), "a Fluent XY plot"),
 )
 
 

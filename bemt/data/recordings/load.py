@@ -32,10 +32,11 @@ from bemt.data.recordings.adapt import (
     damaged_export,
     findings,
     is_recording,
+    marked,
     recognised,
     reduction_of,
 )
-from bemt.data.recordings.cfd_files import EXPORT, FIELDS, PROGRAMS, cfd_files, clock_of
+from bemt.data.recordings.cfd_files import EXPORT, PROGRAMS, cfd_files, clock_of
 from bemt.data.recordings.cfd_loads import other_than_loads
 from bemt.data.recordings.grid_study import merged, of_table
 from bemt.data.recordings.reduce import reduction
@@ -96,8 +97,11 @@ def _kind(path: str | os.PathLike[str], name: str) -> str:
         if told is None:
             raise
         raise InputError(Fault(name, "", told[0], "results as a table of text", told[1])) from error
-    damaged = damaged_export(path) if getattr(importers.importers()[kind], "FALLBACK", False) else ""
-    if damaged:
+    if not getattr(importers.importers()[kind], "FALLBACK", False):
+        return kind
+    if told := marked(path):
+        raise InputError(Fault(name, "", told[0], "results as a table of text", told[1]))
+    if damaged := damaged_export(path):
         hint = "Its head is cut or altered; export it again, or give --format"
         raise InputError(Fault(name, "", f"what looks like {damaged}", "a whole file", hint))
     return kind
@@ -294,8 +298,7 @@ def runs_of(
         if not isinstance(error, InputError):
             # what a file refuses to hold its own entry says; where we fail to join files, nothing else does
             return runs, None if isinstance(error, (ValueError, OSError)) else _refusal(error)
-        fields = {importers.detect(e) for e in exports} <= FIELDS  # values at points are no run
-        return runs, None if fields and any(f.expected == cfd_run.NO_LOAD for f in error.faults) else str(error)
+        return runs, str(error)
 
 
 def _refusal(error: Exception) -> str:
