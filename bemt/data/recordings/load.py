@@ -8,7 +8,6 @@ that the user states.
 from __future__ import annotations
 
 import os
-import re
 import traceback
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -17,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from bemt.base.averaging import Mean, relation
+from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError, system_fault
 from bemt.data import readers as importers
 from bemt.data.readers.cfd_run import KIND as RUN
@@ -36,7 +35,7 @@ from bemt.data.recordings.adapt import (
     recognised,
     reduction_of,
 )
-from bemt.data.recordings.cfd_files import EXPORT, PROGRAMS, cfd_files, clock_of
+from bemt.data.recordings.cfd_files import EXPORT, PROGRAMS, cfd_files
 from bemt.data.recordings.cfd_loads import other_than_loads
 from bemt.data.recordings.grid_study import merged, of_table
 from bemt.data.recordings.reduce import reduction
@@ -48,7 +47,6 @@ __all__ = ["Choice", "as_dataset", "averaged", "import_file", "import_files"]
 
 SETTLED = 0.01
 """Drift above which a mean is called unsettled."""
-_RESTART = re.compile(r"(.+?)((?:_\d+)+)(\.[^.]*)?(?:\.gz)?")
 
 
 def import_file(path: str | os.PathLike[str], format: str | None = None, choice: Choice | None = None) -> Dataset:  # noqa: A002
@@ -139,36 +137,6 @@ def _unsettled(record: Dataset) -> list[str]:
     return [f"not settled (drift over the averaged part): {', '.join(moving[:6])}{more}"] if moving else []
 
 
-def _restart_notes(paths: Sequence[str], records: Mapping[str, Dataset]) -> dict[str, list[str]]:
-    """Say of every restart file what it belongs to, and that it was not joined."""
-    notes: dict[str, list[str]] = {}
-    for path in paths:
-        record = records.get(path)
-        if record is None or record.clock not in ("time", "iteration"):
-            continue
-        for other in _earlier(Path(path), paths, records):
-            text = f"next to {other}: not joined"
-            if other in records:
-                how = relation(clock_of(records[other]), clock_of(record))
-                text = f"restart of {other} ({how}): not joined"
-                if how == "other clock":
-                    text += "; the same steps mean other times"
-            notes.setdefault(path, []).append(text)
-    return notes
-
-
-def _earlier(path: Path, paths: Sequence[str], records: Mapping[str, Dataset]) -> list[str]:
-    match = _RESTART.fullmatch(path.name)
-    if match and records[str(path)].format == "fluent_report":
-        base = path.with_name(match[1] + (match[3] or ""))
-        known = [p for p in paths if Path(p) == base]
-        return known or ([str(base)] if base.is_file() else [])
-    start = importers.number(path.parent.name) if records[str(path)].format == "openfoam_forces" else None
-    parts = {p: importers.number(Path(p).parent.name) for p in paths if p in records and Path(p).name == path.name
-             and Path(p).parent.parent == path.parent.parent}  # fmt: skip
-    return [p for p, at in parts.items() if start is not None and at is not None and at < start]
-
-
 def import_files(
     paths: Iterable[str | os.PathLike[str]], format: str | None = None, choice: Choice | None = None,  # noqa: A002
     run: RunToml | None = None, insist: bool = False, stated: Mapping[str, Dataset] = {},  # noqa: B006
@@ -192,8 +160,7 @@ def import_files(
         to_do = None
     told = {d.file for d in runs}
     runs = [*runs, *(d for d in records.values() if cfd_run.is_run(d) and d.file not in told)]
-    notes = _restart_notes(names, records)
-    files = [_file(name, format, records.get(name), notes.get(name, []), errors.get(name)) for name in names]
+    files = [_file(name, format, records.get(name), errors.get(name)) for name in names]
     return Imported(tuple(files), tuple(d for d in runs if cfd_run.is_run(d)), to_do)
 
 
@@ -313,14 +280,14 @@ def _refusal(error: Exception) -> str:
 
 
 def _file(
-    name: str, format: str | None, record: Dataset | None, notes: Sequence[str], error: str | None  # noqa: A002
+    name: str, format: str | None, record: Dataset | None, error: str | None  # noqa: A002
 ) -> ImportedFile:  # fmt: skip
     if record is None:
-        return ImportedFile(name, format, warnings=tuple(notes), error=error)
+        return ImportedFile(name, format, error=error)
     try:
         reduced = _reduced(record)
         found = ImportedFile(name, record.format, record, reduced, _means(record, reduced),
-                             findings(record), (*record.notes, *notes), error)  # fmt: skip
+                             findings(record), record.notes, error)  # fmt: skip
         found.document()  # what cannot be shown is refused with its file
     except Exception as failed:
         return ImportedFile(name, format, error=_refusal(failed))
