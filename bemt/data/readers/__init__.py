@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NoReturn, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -36,6 +36,7 @@ from bemt.base import plugins
 from bemt.base.errors import Fault, InputError, system_fault
 from bemt.base.packed import MAX_BYTES, packed, part_of, unpacked
 from bemt.base.toml_text import Collector
+from bemt.data.readers.marks import instead
 
 __all__ = [
     "HEAD_BYTES", "Reader", "SourceText", "decode", "detect", "head_text", "importers", "load_text", "number", "read",
@@ -337,21 +338,25 @@ def detect(path: str | os.PathLike[str]) -> str:
         head = _head(target, place)
         if not head.strip():
             place.refuse("", "an empty file", "results as a table of text", "Did the export finish?")
-        kinds = [k for k, m in known.items() if m.sniff(head)]
-        kinds = [k for k in kinds if not getattr(known[k], "FALLBACK", False)] or kinds
-        if not kinds:
-            _unknown(target, head, place)
+        claimed = [k for k, m in known.items() if m.sniff(head)]
+        if not (kinds := [k for k in claimed if not getattr(known[k], "FALLBACK", False)]):
+            _refuse_known(target, head, place, bool(claimed))
+            kinds = claimed
     if len(kinds) > 1:
         hint = " or ".join(f'format = "{kind}"' for kind in kinds)
         place.refuse("", f"content claimed by {', '.join(kinds)}", "one format", f"Give {hint}")
     return kinds[0]
 
 
-def _unknown(target: Path, head: bytes, place: Collector) -> NoReturn:
-    """Refuse a file that no reader claims, with what reads it or what it is."""
-    for command, where in plugins.offered("FILE_KINDS").items():
+def _refuse_known(target: Path, head: bytes, place: Collector, a_table: bool) -> None:
+    """Refuse a file that only the reader of tables claims where it is something else, and any that none claims."""
+    for command, where in plugins.offered("FILE_KINDS").items() if not a_table else ():
         if kind := plugins.load(where)(target):
             place.refuse("", kind, "a recording of a stand", f"It is read by {command} {target}")
+    if told := instead(head, a_table):
+        place.refuse("", *told)
+    if a_table:
+        return
     if _binary(head):
         place.refuse("", "binary data (NUL bytes)", "a text file", "Export the data as plain text (CSV)")
     hint = "Give --format (format = in a case) if its head is unusual"

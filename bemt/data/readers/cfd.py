@@ -21,7 +21,7 @@ from bemt.base.averaging import Mean, keep_last, steady_average
 from bemt.base.errors import Fault
 from bemt.base.tables import number_of
 from bemt.data.readers import SourceText, head_text, number, unit_text
-from bemt.data.readers.samples import Channel, channels_of, dataset
+from bemt.data.readers.samples import Channel, dataset
 from bemt.physics.dataset import Dataset
 
 _NAN = re.compile(r"[+-]?(nan|n/a|-?1\.#(qnan|snan|ind|inf)\w*|inf(inity)?|null|\*+)(\(\w*\))?", re.IGNORECASE)
@@ -331,13 +331,3 @@ def _clock(values: Array, roles: Sequence[str], role: str) -> int | None:
         if own == role and (len(values) == 1 or len(np.unique(values[np.isfinite(values[:, k]), k])) > 1):
             return k
     return None
-
-
-def side_by_side(parts: Iterable[tuple[str, Dataset]]) -> tuple[dict[str, Channel], list[str]]:
-    """Channels of several tables of one file, each with the label of its table behind its name, and their notes."""
-    channels: dict[str, Channel] = {}
-    notes: list[str] = []
-    for label, record in parts:
-        channels |= {f"{name}({label})": channel for name, channel in channels_of(record).items()}
-        notes += [f"{label}: {text}" for text in record.notes]
-    return channels, notes

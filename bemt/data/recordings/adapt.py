@@ -1,27 +1,22 @@
-"""What readers of other rooms return, as the record that ``import`` shows; and names for files that hold no results."""
+"""What readers of other rooms return, as the record that ``import`` shows."""
 
 from __future__ import annotations
 
 import math
-import os
-import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import singledispatch
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from bemt.base.averaging import Mean, keep_last, revolution_average
 from bemt.base.errors import Fault, InputError, refuse
-from bemt.base.packed import packed, part_of, unpacked
-from bemt.data.readers import load_bytes, polars_c81, uiuc
+from bemt.data.readers import uiuc
 from bemt.data.readers.apc import ApcPerformance
 from bemt.data.readers.references import Reference
 from bemt.data.readers.samples import Channel, dataset
 from bemt.data.readers.slices import Slices
-from bemt.data.recordings.cfd_files import EXPORT
 from bemt.data.recordings.channels import clocks_of, named
 from bemt.data.recordings.check import Finding, check
 from bemt.data.recordings.reduce import reduce
@@ -57,106 +52,6 @@ def reduction_of(record: Dataset) -> Dataset | str:
 
 _KIND = {"apc": "vendor", "uiuc": "bench", "references": "table"}
 _GEOMETRY = ("ApcBlade", "BladeFile", "UiucGeometry", "UiucThickness")
-_EXPORT = f"Fields and meshes hold no loads. {EXPORT}"
-_Mark = tuple[re.Pattern[bytes], str, str]
-_PAGE = ("a web page", "Download the file that it shows, or save its table as CSV")
-_FOAM = ("an OpenFOAM dictionary or field", "Import postProcessing/*/*/*.dat")
-_FLUENT = "file (mesh, fields and settings)"
-
-
-def _begins(mark: bytes, got: str, hint: str) -> _Mark:
-    return re.compile(rb"\A\s*" + re.escape(mark)), got, hint
-
-
-_MARKS: tuple[_Mark, ...] = (
-    (re.compile(rb"\A\s*\Z"), "an empty file", "Did the export finish?"),
-    (re.compile(rb"(?s)\A.{0,1991}<VTKFile "), "a VTK file", _EXPORT),
-    _begins(b"\x89HDF", "HDF5 data (a case, mesh or field file)", _EXPORT),
-    _begins(b"PK\x03\x04", "a damaged zip archive or workbook", "Copy it again, or save the sheet as CSV"),
-    _begins(b"%PDF", "a PDF document", "Copy the numbers into a CSV"),
-    _begins(b"\x89PNG", "a picture", ""),
-    _begins(b"\xff\xd8\xff", "a picture", ""),
-    _begins(b"(rp (", "solver settings of Fluent (no results)", "Settings hold no results; export the report files"),
-    _begins(b"FoamFile", *_FOAM),
-    _begins(b"$MeshFormat", "a mesh", _EXPORT),
-    _begins(b"C Binary", "an EnSight file", _EXPORT),
-    _begins(b"#!TDV", "a Tecplot binary file", _EXPORT),
-    _begins(b"<?xml", "XML", "Export as CSV"),
-    _begins(b"# vtk", "a VTK file", _EXPORT),
-    _begins(b"version https://git-lfs", "a Git LFS pointer instead of the file", "Fetch it: git lfs pull"),
-    _begins(b"{", "JSON, or a program's settings", "Save the numbers as CSV with a line of headings"),
-    _begins(b"<!DOCTYPE", *_PAGE),
-    _begins(b"<html", *_PAGE),
-    (re.compile(rb'(?s)\A(?=.*Grid size).{0,390}\(0 "(?i:fluent)'), f"a Fluent data {_FLUENT}", _EXPORT),
-    (re.compile(rb'(?s)\A.{0,390}\(0 "(?i:fluent)'), f"a Fluent case {_FLUENT}", _EXPORT),
-    (re.compile(rb"(?s)\A.{0,1992}FoamFile"), *_FOAM),
-)
-_IN_TEXT: tuple[_Mark, ...] = (
-    (re.compile(rb"^\s*(#[^\n]*\n\s*)*FORMAT\s+type:\s*ensight", re.IGNORECASE), "an EnSight case file", _EXPORT),
-    (re.compile(rb"APC Propeller .*(Predictions|RPM Range)"), "a summary of APC over many propellers (PER2)",
-     "Import the propeller's own file, PER3_*.dat"),
-    (re.compile(rb"^\(\(xy/key/label", re.MULTILINE), "a Fluent XY plot", EXPORT),
-    (re.compile(rb"^\s*Force vector: \(", re.MULTILINE), "a force report of Fluent 6 or older",
-     "Copy its table into a CSV with units in the headings"),
-)  # fmt: skip
-
-
-def _head_of(path: str | os.PathLike[str]) -> bytes:
-    """First bytes of a file, unpacked; none of one that cannot be read."""
-    try:
-        with Path(part_of(path)[0]).open("rb") as stream:
-            head = stream.read(16384)
-        return unpacked(load_bytes(path), os.fspath(path), 16384) if packed(head) else head
-    except (OSError, InputError):
-        return b"?"
-
-
-def marked(path: str | os.PathLike[str]) -> tuple[str, str] | None:
-    """Identify a file by marks that no table of results has: what it is, and a hint; None: it has none."""
-    head = _head_of(path)
-    marks = _MARKS if b"\0" in head else (*_MARKS, *_IN_TEXT)
-    return next(((got, hint) for mark, got, hint in marks if mark.search(head)), None)
-
-
-def recognised(path: str | os.PathLike[str]) -> tuple[str, str] | None:
-    """Identify a file that no reader takes: what it is, and a hint; None: the reason of the readers says it."""
-    if found := marked(path):
-        return found
-    head = _head_of(path)
-    if b"\0" not in head:
-        return _as_text(head.decode("latin-1"))
-    zeros = max(head[0:400:2].count(0), head[1:400:2].count(0))
-    if zeros > 0.8 * len(head[:400]) / 2 and bytes(16) not in head:
-        return ("what looks like UTF-16 without its mark", "Save the file as UTF-8")
-    return None
-
-
-def _as_text(head: str) -> tuple[str, str] | None:
-    """What a text looks like that is no table of numbers."""
-    lines, words = [line for line in head.splitlines() if line.strip()], head.split()
-    if polars_c81.resembles(head):
-        hint = "Fields are 7 characters wide, nine values after the first; or write alpha_deg, cl, cd, mach as CSV"
-        return ("a C81 table with a different column width", hint)
-    if len(lines) == 1 and re.search(r"[,;\t]", lines[0]):
-        return ("one line and no rows", "Did the logger write any?")
-    if len(lines) > 2 and not any(re.search(r"[\s,;|]", line.strip()) for line in lines):
-        return ("a single column", "One column alone is not enough: also export time, speed or setting")
-    numbers = sum(word.strip("(),;").lstrip("+-").replace(".", "", 1)[:1].isdigit() for word in words)
-    return ("a text without a table of numbers", "") if len(words) > 20 and numbers < 0.2 * len(words) else None
-
-
-_DAMAGED = (
-    (re.compile(rb'^[^"\n,]*"(?:[ \t]+"[^"\n]*")*\)[ \t]*\r?$', re.MULTILINE), "a Fluent report file"),
-    (re.compile(rb'^[^"\n,]*"[ \t]+"[^"\n]*"[ \t]*\r?\n[-+.\d]', re.MULTILINE), "a Fluent monitor"),
-    (re.compile(rb"\(\([-+.\deE ]+\) \([-+.\deE ]+\)"), "an OpenFOAM forces file"),
-)
-
-
-def damaged_export(path: str | os.PathLike[str]) -> str | None:
-    """Say which export a file was, when its body shows it and its head no longer does."""
-    with Path(part_of(path)[0]).open("rb") as stream:
-        head = stream.read(16384)
-    return next((name for mark, name in _DAMAGED if mark.search(head)), None)
 
 
 def _columns(found: Any) -> Iterator[tuple[str, Any]]:

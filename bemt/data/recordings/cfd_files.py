@@ -23,11 +23,6 @@ PROGRAMS: Mapping[str, str] = {
     "openfoam_forces": "OpenFOAM", "su2_history": "SU2", "flow360_forces": "Flow360",
 }  # fmt: skip
 """Program by reader."""
-EXPORT = (
-    "Write a report file of thrust and torque (Fluent), save the monitors as CSV (STAR-CCM+), or use the function "
-    "object forces (OpenFOAM)"
-)
-"""Where loads come from."""
 SEVERAL = (
     "One condition on several grids: --setup cells=a,b,c, a number for each grid. Other runs: import each with --out, "
     "then give the .toml files together. A restart with its own clock: alone"

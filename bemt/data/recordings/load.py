@@ -21,6 +21,7 @@ from bemt.base.errors import Fault, InputError, system_fault
 from bemt.data import readers as importers
 from bemt.data.readers.cfd_run import KIND as RUN
 from bemt.data.readers.cfd_run import RunHead, RunToml
+from bemt.data.readers.marks import EXPORT
 from bemt.data.readers.split import some
 from bemt.data.readers.uiuc_tables import NO_SPEED
 from bemt.data.recordings import cfd_run
@@ -28,14 +29,11 @@ from bemt.data.recordings.adapt import (
     Choice,
     adapt,
     averaged,
-    damaged_export,
     findings,
     is_recording,
-    marked,
-    recognised,
     reduction_of,
 )
-from bemt.data.recordings.cfd_files import EXPORT, PROGRAMS, cfd_files
+from bemt.data.recordings.cfd_files import PROGRAMS, cfd_files
 from bemt.data.recordings.cfd_loads import other_than_loads
 from bemt.data.recordings.grid_study import merged, of_table
 from bemt.data.recordings.reduce import reduction
@@ -57,7 +55,7 @@ def import_file(path: str | os.PathLike[str], format: str | None = None, choice:
         raise InputError(Fault(name, "", "a folder with a case", "a recording", "`bemt sweep` solves cases"))
     if format is None and Path(path).is_dir() and (inside := _run_in(Path(path))) is not None:
         return inside if isinstance(inside, Dataset) else cfd_run.assemble(inside, Path(), name)
-    kind = _kind(path, name) if format is None else format
+    kind = importers.detect(path) if format is None else format
     try:
         found = importers.read(path, kind)
     except InputError as error:  # the columns of a UIUC line under a name of one's own: a table without a speed
@@ -84,25 +82,6 @@ def _finished(record: Dataset, choice: Choice) -> Dataset:
         note = "mean over all rows, including start-up; give --rpm or --period-s for whole revolutions"
         record = replace(record, notes=(*record.notes, note))
     return replace(record, notes=(*record.notes, *_unsettled(record)))
-
-
-def _kind(path: str | os.PathLike[str], name: str) -> str:
-    """Reader of a file; refused with what it looks like where that is no table, or a damaged export."""
-    try:
-        kind = importers.detect(path)
-    except InputError as error:
-        told = recognised(path)
-        if told is None:
-            raise
-        raise InputError(Fault(name, "", told[0], "results as a table of text", told[1])) from error
-    if not getattr(importers.importers()[kind], "FALLBACK", False):
-        return kind
-    if told := marked(path):
-        raise InputError(Fault(name, "", told[0], "results as a table of text", told[1]))
-    if damaged := damaged_export(path):
-        hint = "Its head is cut or altered; export it again, or give --format"
-        raise InputError(Fault(name, "", f"what looks like {damaged}", "a whole file", hint))
-    return kind
 
 
 def _run_in(folder: Path) -> Dataset | RunToml | None:
