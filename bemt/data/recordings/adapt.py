@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import singledispatch
 from typing import Any
@@ -12,7 +12,6 @@ import numpy as np
 
 from bemt.base.averaging import Mean, keep_last, revolution_average
 from bemt.base.errors import Fault, InputError, refuse
-from bemt.data.readers import uiuc
 from bemt.data.readers.apc import ApcPerformance
 from bemt.data.readers.references import Reference
 from bemt.data.readers.samples import Channel, dataset
@@ -85,9 +84,8 @@ def adapt(found: Any, form: str, name: str) -> Dataset:
     if isinstance(found, Mapping):
         return _along(found, form, name)
     made = _dataclass(found, form, name) if is_dataclass(found) and not isinstance(found, type) else None
-    if isinstance(found, (list, tuple)) and found:
-        make = next((make for kind, make in _LISTS.items() if all(isinstance(item, kind) for item in found)), None)
-        made = make(list(found), form, name) if make else None
+    if isinstance(found, list) and found and all(isinstance(item, Reference) for item in found):
+        made = _references(found, form, name)
     if made is None:
         raise InputError(Fault(name, "", f"a {type(found).__name__} without numbers", "something that can be shown"))
     return made
@@ -152,19 +150,6 @@ def _along(found: Mapping[str, Slices], form: str, name: str) -> Dataset:
     channels = {k: Channel(np.concatenate([getattr(s, a) for s in found.values()]), k.split("_", 3)[-1] if a != "r"
                            else "m") for k, a in columns.items()}  # fmt: skip
     return dataset(form, "table", channels, notes, {"file": name})
-
-
-def _propellers(found: list[uiuc.UiucPropeller], form: str, name: str) -> Dataset:
-    runs = [uiuc.to_series(item) for item in found if item.statics or item.lines]
-    bare = len(found) - len(runs)
-    notes = [f"{len(found)} propellers"] + ([f"{bare} of them with geometry only"] if bare else [])
-    columns = {key: np.concatenate([run[key] for run in runs]) for key in runs[0].values} if runs else {}
-    if not columns:
-        columns = {"diameter_in": np.array([item.diameter_in for item in found])}
-    return dataset(form, "bench", _channels(columns), notes, {"file": name})
-
-
-_LISTS: Mapping[type, Callable[..., Dataset]] = {Reference: _references, uiuc.UiucPropeller: _propellers}
 
 
 # Averages of one history over whole revolutions, whose duration only the user knows.

@@ -85,11 +85,9 @@ def _finished(record: Dataset, choice: Choice) -> Dataset:
 
 
 def _run_in(folder: Path) -> Dataset | RunToml | None:
-    """CFD run of a folder: its run.toml, else all exports in it; None where a reader takes the folder."""
+    """CFD run of a folder: its run.toml, else all exports in it; None where it has neither."""
     if (folder / "run.toml").is_file():
         return import_file(folder / "run.toml")
-    if any(hasattr(m, "sniff_folder") and m.sniff_folder(folder) for m in importers.importers().values()):
-        return None
     files = cfd_files(folder)
     return RunToml.model_validate({"run": {"files": tuple(map(str, files))}}) if files else None
 
