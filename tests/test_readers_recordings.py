@@ -288,8 +288,10 @@ def test_what_is_no_table_is_refused(text: str, write: Write) -> None:
 
 
 def test_a_binary_file_is_refused_as_such(write: Write) -> None:
-    with pytest.raises(InputError, match="binary data.*Export the data as plain text"):
+    with pytest.raises(InputError, match="a damaged zip archive or workbook.*save the sheet as CSV"):
         importers.read(write(b"PK\x03\x04\x00\x00\x00rest", "book.xlsx"))
+    with pytest.raises(InputError, match="binary data.*Export the data as plain text"):
+        importers.read(write(b"\x01\x02\x00\x00\x00rest", "log.bin"))
 
 
 # ---------------------------------------------------------------- RCbenchmark
