@@ -158,11 +158,6 @@ class GridSolver:
         self._air_names = [name for name in grid.names if name in AIR]
         self._airs: dict[int, Air] = {}
 
-    def _ready(self, geometry: int, overrides: Mapping[str, float]) -> Any:
-        if self._last[0] != geometry:
-            self._last = (geometry, prepared(self.case.replaced(overrides)))
-        return self._last[1]
-
     def _state(self, flat: int) -> Air:
         """State of the air at a position on the axes of the air."""
         if flat not in self._airs:
@@ -189,7 +184,9 @@ class GridSolver:
         distinct, here = np.unique(which, return_inverse=True)
         states = [self._state(flat) for flat in distinct.tolist()]
         air = states[0] if not self._air_names else air_arrays(states, here)
-        found = solve_at(self._ready(geometry, overrides), flow[0], flow[1], flow[2], air, self.threads)
+        if self._last[0] != geometry:
+            self._last = (geometry, prepared(self.case.replaced(overrides)))
+        found = solve_at(self._last[1], flow[0], flow[1], flow[2], air, self.threads)
         if _turned(self.case) and not np.any(flow[2]):  # axial points of an oblique grid
             return replace(found, values={**found.values, "H_force_N": np.where(found.converged, 0.0, np.nan)})
         return found
