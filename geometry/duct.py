@@ -6,7 +6,7 @@ Axial coordinate x runs downstream from the leading edge of the lip.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,11 +18,7 @@ from geometry.rotor import Rotor
 
 @dataclass(frozen=True)
 class Stator:
-    """A row of straight vanes behind the rotor.
-
-    >>> round(float(Stator(5, 0.02).sigma(0.025)), 3)
-    0.637
-    """
+    """A row of straight vanes behind the rotor."""
 
     B: int  # Number of vanes
     chord: float  # Vane chord, the same from hub to wall [m]
@@ -40,11 +36,6 @@ class Stator:
             faults.number("stator.x", self.x, 0.0, math.inf, "m")
         faults.number("stator.beta", self.beta, 0.0, math.pi, "rad", "Given in degrees?" if self.beta > math.pi else "")
         faults.check()
-
-    def sigma(self, r: ArrayLike) -> Array:
-        """Local solidity B c / (2 pi r) [-] at radii r [m]."""
-        out: Array = self.B * self.chord / (2 * np.pi * np.asarray(r, dtype=np.float64))
-        return out
 
 
 @dataclass(frozen=True)
@@ -122,14 +113,6 @@ class Duct:
         """Flow area in the exit plane, the body there taken off [m^2]."""
         return math.pi * (self._exit**2 - self.exit_hub_radius**2)
 
-    def annulus_area(self, rotor: Rotor) -> float:
-        """Return the area swept by the blades, pi (R^2 - Rhub^2) [m^2]."""
-        return rotor.annulus_area
-
-    def area_ratio(self, rotor: Rotor) -> float:
-        """Return exit area over swept annulus area, the wake area ratio of duct momentum theory [-]."""
-        return self.exit_area / rotor.annulus_area
-
     @property
     def lip_length(self) -> float:
         """Axial length of the lip [m]."""
@@ -146,10 +129,6 @@ class Duct:
             return self.lip_length, max(self.lip_radius, self._te - self.lip_radius)
         rise = self.outer_radius - self.inner_radius - self.lip_radius
         return min(rise, self.length), rise
-
-    def gap_over_span(self, rotor: Rotor) -> float:
-        """Return tip gap over blade length [-]."""
-        return self.gap / rotor.span
 
     @property
     def bore_end(self) -> float:
@@ -205,22 +184,6 @@ class Duct:
         x = np.unique(np.concatenate([nose, body, [self.bore_end, self._rotor]]))
         return np.stack([x, self.inner(x)], axis=1), np.stack([x, self.outer(x)], axis=1)
 
-    def scaled(self, factor: float) -> Duct:
-        """Return the duct and its stator with every length multiplied by `factor` [-]."""
-
-        def times(value: float | None) -> float | None:
-            return None if value is None else value * factor
-
-        stator = self.stator
-        if stator is not None:
-            stator = replace(stator, chord=stator.chord * factor, x=times(stator.x))
-        return replace(
-            self, inner_radius=self.inner_radius * factor, length=self.length * factor, gap=self.gap * factor,
-            lip_radius=self.lip_radius * factor, exit_radius=times(self.exit_radius), rotor_x=times(self.rotor_x),
-            exit_hub_radius=self.exit_hub_radius * factor, stator=stator, diffuser_x=times(self.diffuser_x),
-            te_thickness=times(self.te_thickness), outer_radius=times(self.outer_radius),
-        )  # fmt: skip
-
 
 def around(rotor: Rotor, length: float, gap: float, lip_radius: float = 0.0, *, exit_area_ratio: float | None = None,
            exit_hub_radius: float = 0.0, rotor_x: float | None = None, stator: Stator | None = None,
@@ -230,7 +193,7 @@ def around(rotor: Rotor, length: float, gap: float, lip_radius: float = 0.0, *, 
 
     >>> from geometry.laws import helix
     >>> rotor = Rotor(helix(0.069, 0.1, "fan", hub=0.368), 8)
-    >>> round(around(rotor, 0.06, 0.0004, exit_area_ratio=0.9).area_ratio(rotor), 6)
+    >>> round(around(rotor, 0.06, 0.0004, exit_area_ratio=0.9).exit_area / rotor.annulus_area, 6)
     0.9
     """
     exit_radius = None

@@ -128,14 +128,6 @@ class Blade:
         """Return the blade turned as a whole by `dbeta` [rad]."""
         return replace(self, beta=self.beta + dbeta)
 
-    def scaled(self, factor: float) -> Blade:
-        """Return the blade with every length multiplied by `factor` (> 0) [-]; angles and sections stay."""
-        return replace(
-            self, r=self.r * factor, chord=self.chord * factor, R=self.R * factor, Rhub=self.Rhub * factor,
-            sweep=None if self.sweep is None else self.sweep * factor,
-            rake=None if self.rake is None else self.rake * factor,
-        )  # fmt: skip
-
     def pitch_m(self, r_over_R: float = 0.75) -> float:
         """Return the geometric pitch 2 pi r tan(beta), the advance per turn, at one r/R (0.75 unless told) [m]."""
         r = r_over_R * self.R
@@ -314,11 +306,6 @@ class Rotor:
         return self.blade.R - self.blade.Rhub
 
     @property
-    def disk_area(self) -> float:
-        """Area of the whole disk, hub included [m^2]."""
-        return math.pi * self.R**2
-
-    @property
     def annulus_area(self) -> float:
         """Area swept by the blades, from hub to tip [m^2]."""
         return math.pi * (self.R**2 - self.Rhub**2)
@@ -331,27 +318,15 @@ class Rotor:
         chord, beta = self.blade.at(self.Rhub)
         return float(chord * abs(np.sin(beta)))
 
-    def sigma(self, r: ArrayLike) -> Array:
-        """Local solidity B c / (2 pi r). [-]"""
-        r = np.asarray(r, dtype=np.float64)
-        out: Array = self.B * self.blade.at(r)[0] / (2 * np.pi * r)
-        return out
-
     @property
     def solidity(self) -> float:
         """Geometric solidity: blade area from hub to tip over disk area [-]."""
         st = self.blade.midpoints(400)
-        return float(self.B * np.sum(st.chord * st.dr)) / self.disk_area
+        return float(self.B * np.sum(st.chord * st.dr)) / (math.pi * self.R**2)
 
     def with_pitch_offset(self, dbeta: float) -> Rotor:
         """Return the rotor with all blades turned by `dbeta` [rad]."""
         return replace(self, blade=self.blade.with_pitch_offset(dbeta))
-
-    def scaled(self, factor: float) -> Rotor:
-        """Return the rotor with every length multiplied by `factor` [-]."""
-        hub = None if self.hub_length is None else self.hub_length * factor
-        blade, spinner = self.blade.scaled(factor), self.spinner_length * factor
-        return replace(self, blade=blade, hub_length=hub, spinner_length=spinner)
 
     def key(self) -> str:
         """Return a text that is equal for equal rotors (the name aside)."""

@@ -109,21 +109,6 @@ def test_an_unknown_zone_is_one_line_with_those_there_are(tmp_path: Path) -> Non
     assert "fan" in fault.got and "blade" in fault.hint and "duct" in fault.hint
 
 
-def test_disks_of_flow360_are_newtons_by_what_it_divides_by(tmp_path: Path) -> None:
-    """XV-15 of the program's own documentation: 91.5224 N and 2.324669 N m for one, in inches at 340.3 m/s."""
-    head = "physical_step, pseudo_step, " + ", ".join(
-        f"Disk0_{what}_{a}" for what in ("Force", "Moment") for a in "xyz"
-    )
-    body = "".join(f"0,{10 * k},0.001,0.002,1,0.001,0.002,1\n" for k in range(20))
-    (tmp_path / "bet_forces_v2.csv").write_text(f"{head}, Disk0_Blade0_R0_ThrustCoeff\n" + body.replace("\n", ",0.3\n"))
-    files = [str(tmp_path / "bet_forces_v2.csv")]
-    with pytest.raises(InputError, match="speed of sound"):
-        assemble(run_from(files, rpm=588.0))
-    run = assemble(run_from(files, rpm=588.0, reference=["density=1.225,sound=340.3,length=0.0254"]))
-    assert run["thrust_N"][0] == pytest.approx(91.5224, rel=1e-5)
-    assert run["torque_Nm"][0] == pytest.approx(2.324669, rel=1e-5)
-
-
 GRIDS = {0.5e6: 7.05, 1.7e6: 7.42, 5.8e6: 7.57}
 """Cells and thrust [N]: order 2.22, 7.671 N, u 1.5 %."""
 

@@ -165,7 +165,7 @@ def test_a_wrong_keyword_is_answered_with_the_right_one() -> None:
     [
         (["swep", "cases"], "Did you mean sweep?"),
         (["sweep", "cases", "--tolerence-pct", "3"], "Did you mean --tolerance-pct?"),
-        (["sweep", "cases", "--engine", "loca"], "Did you mean local?"),
+        (["diagnose", "a.csv", "--baseline", "bemr"], "Did you mean bemt?"),
     ],
 )
 def test_what_was_meant_is_guessed_and_said_but_not_done(

@@ -1,4 +1,4 @@
-"""Fetching a database: whole or not at all, resumed, checked. A local server stands for the publisher's."""
+"""Fetching a database: whole or not at all, checked. A local server stands for the publisher's."""
 
 from __future__ import annotations
 
@@ -58,13 +58,11 @@ def zipped(files: dict[str, str | bytes], filler: int = 0) -> bytes:
 
 
 class Server(ThreadingHTTPServer):
-    """Serves one body; may break off after `cut` bytes; remembers the ranges it was asked for."""
+    """Serves one body; may break off after `cut` bytes; counts how often it was asked."""
 
     body = b""
-    tag = '"one"'
     cut: int | None = None
-    ranges: list[str | None]
-    said: list[int]
+    asked = 0
 
 
 class Handler(BaseHTTPRequestHandler):
@@ -72,21 +70,14 @@ class Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         s = self.server
-        s.ranges.append(self.headers.get("Range"))
+        s.asked += 1
         if self.path != "/UIUC-propDB.zip":
             self.send_error(404)
             return
-        start = 0
-        if self.headers.get("Range") and self.headers.get("If-Range") == s.tag:
-            start = int(self.headers["Range"].removeprefix("bytes=").rstrip("-"))
-        self.send_response(206 if start else 200)
-        s.said.append(206 if start else 200)
-        if start:
-            self.send_header("Content-Range", f"bytes {start}-{len(s.body) - 1}/{len(s.body)}")
-        self.send_header("Content-Length", str(len(s.body) - start))
-        self.send_header("ETag", s.tag)
+        self.send_response(200)
+        self.send_header("Content-Length", str(len(s.body)))
         self.end_headers()
-        self.wfile.write(s.body[start : s.cut])
+        self.wfile.write(s.body[: s.cut])
 
     def log_message(self, *args: object) -> None:
         pass
@@ -95,7 +86,7 @@ class Handler(BaseHTTPRequestHandler):
 @pytest.fixture
 def server() -> Iterator[Server]:
     s = Server(("127.0.0.1", 0), Handler)
-    s.body, s.ranges, s.said = zipped(FILES), [], []
+    s.body = zipped(FILES)
     thread = threading.Thread(target=s.serve_forever, kwargs={"poll_interval": 0.01})
     thread.start()
     yield s
@@ -145,10 +136,10 @@ def test_a_named_folder_comes_before_the_cache(server, no_cache_but, tmp_path, m
 def test_what_is_there_is_not_fetched_again(server, tmp_path):
     first = data.get("uiuc", tmp_path / "uiuc", url=url(server))
     again = data.get("uiuc", tmp_path / "uiuc", url=url(server))
-    assert len(server.ranges) == 1 and again.sha256 == first.sha256
+    assert server.asked == 1 and again.sha256 == first.sha256
     assert (again.checksum, again.fetched) == ("as recorded", False)
     fresh = data.get("uiuc", tmp_path / "uiuc", url=url(server), refresh=True)
-    assert len(server.ranges) == 2 and (fresh.checksum, fresh.fetched) == ("as recorded", True)
+    assert server.asked == 2 and (fresh.checksum, fresh.fetched) == ("as recorded", True)
 
 
 def test_a_changed_archive_is_refused(server, tmp_path):
@@ -161,27 +152,15 @@ def test_a_changed_archive_is_refused(server, tmp_path):
     assert left(tmp_path) == {"uiuc"}
 
 
-def test_an_interrupted_download_goes_on_where_it_stopped(server, tmp_path):
+def test_an_interrupted_download_leaves_nothing_and_the_next_one_is_whole(server, tmp_path):
     server.body = zipped(FILES, filler=400_000)
     server.cut = 150_000
     with pytest.raises(InputError):
         data.get("uiuc", tmp_path / "uiuc", url=url(server))
-    part = tmp_path / ".uiuc.zip.part"
-    have = part.stat().st_size
-    assert 0 < have <= 150_000 and not (tmp_path / "uiuc").exists()
+    assert left(tmp_path) == set()
     server.cut = None
     doc = data.get("uiuc", tmp_path / "uiuc", url=url(server))
-    assert server.ranges[-1] == f"bytes={have}-" and server.said[-1] == 206
     assert doc.bytes == len(server.body) and left(tmp_path) == {"uiuc"}
-
-
-def test_after_a_change_the_rest_is_not_glued_to_the_old_part(server, tmp_path):
-    server.body, server.cut = zipped(FILES, filler=400_000), 150_000
-    with pytest.raises(InputError):
-        data.get("uiuc", tmp_path / "uiuc", url=url(server))
-    server.body, server.cut, server.tag = zipped(FILES, filler=500_000), None, '"two"'
-    doc = data.get("uiuc", tmp_path / "uiuc", url=url(server))
-    assert server.said[-1] == 200 and doc.bytes == len(server.body)
 
 
 def test_an_address_that_does_not_answer_is_an_input_error(server, tmp_path, capsys):
@@ -286,7 +265,7 @@ def test_what_the_user_added_or_changed_is_not_deleted(server, tmp_path):
     mine.write_text("days of work")
     refused("files added or changed since (1): volume-1/mine/notes.txt", "--out")
     refused("notes.txt", source=None, url=url(server), refresh=True)
-    assert not server.ranges and left(tmp_path) == {"a.zip", "uiuc"}  # told before anything is fetched
+    assert not server.asked and left(tmp_path) == {"a.zip", "uiuc"}  # told before anything is fetched
     assert data.get("uiuc", folder).names is None  # only looked at: nothing to refuse
     mine.unlink()
     table = folder / "volume-1" / "data" / "test_10x5_geom.txt"

@@ -55,8 +55,10 @@ def test_a_long_straight_pipe_neither_squeezes_nor_widens_its_jet() -> None:
 
 def test_the_jet_knows_shapes_and_not_sizes() -> None:
     duct = Duct(0.15, 0.13, 0.018, exit_radius=0.14, exit_hub_radius=0.033, rotor_x=0.045)
-    for d in (duct, dataclasses.replace(duct, outer_radius=0.176)):
-        small, large = jet_area(d, 0.033), jet_area(d.scaled(7.0), 7.0 * 0.033)
+    big = Duct(1.05, 0.91, 0.126, exit_radius=0.98, exit_hub_radius=0.231, rotor_x=0.315)
+    outer = dataclasses.replace(duct, outer_radius=0.176), dataclasses.replace(big, outer_radius=1.232)
+    for d, scaled in ((duct, big), outer):
+        small, large = jet_area(d, 0.033), jet_area(scaled, 7.0 * 0.033)
         assert [*large[:3], *large.nose] == pytest.approx([*small[:3], *small.nose], rel=1e-6)
 
 

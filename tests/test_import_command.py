@@ -17,6 +17,7 @@ import bemt
 from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.data.recordings.adapt import Choice
+from bemt.data.recordings.cfd_options import run_from
 from bemt.data.recordings.channels import named
 from bemt.data.recordings.check import check
 from bemt.data.recordings.load import import_file, import_files
@@ -80,26 +81,21 @@ def test_a_steady_run_does_not_use_the_speed_and_must_have_settled(put: Callable
     assert any(w.startswith("not settled") and "thrust +5.73%" in w for w in file["warnings"])
 
 
-def test_restart_files_are_named_and_never_joined(put: Callable[..., Path]) -> None:
+def test_restart_files_on_another_clock_are_never_joined(put: Callable[..., Path]) -> None:
     a = put("q-rfile.out", history())
     b = put("q-rfile_1_1.out", history(per_turn=80))  # the same steps at other times
-    found = import_files([a, b], choice=Choice(period=PERIOD)).document()["files"]
-    assert [f["rows"] for f in found] == [300, 480]
-    assert any("(other clock): not joined; the same steps mean other times" in w for w in found[1]["warnings"])
-    assert not any("joined" in w for w in found[0]["warnings"])
-    alone = import_files([b]).document()["files"][0]
-    assert any(f"next to {a}: not joined" in w for w in alone["warnings"])
-    c = put("other-rfile.out", history())
-    d = put("other-rfile_1_300.out", history(start=3.0, first=301))
-    assert any("(continues): not joined" in w for w in import_files([c, d]).document()["files"][1]["warnings"])
+    found = import_files([a, b], choice=Choice(period=PERIOD)).document()
+    assert [f["rows"] for f in found["files"]] == [300, 480]
+    assert not found["runs"] and "on another clock; expected files of one run" in found["to_do"]
 
 
-def test_openfoam_start_folders_are_restarts_too(put: Callable[..., Path]) -> None:
+def test_openfoam_start_folders_are_one_run(put: Callable[..., Path]) -> None:
     head = "# Force\n# Time\ttotal_x total_y total_z\n"
     one = put("forces/0/force.dat", head + "".join(f"{0.01 * k:g} 1 0 0\n" for k in range(1, 30)))
     two = put("forces/0.2/force.dat", head + "".join(f"{0.2 + 0.01 * k:g} 2 0 0\n" for k in range(1, 30)))
-    found = import_files([one, two]).document()["files"]
-    assert any("not joined" in w for w in found[1]["warnings"]) and not any("joined" in w for w in found[0]["warnings"])
+    run = run_from([str(one), str(two)], rpm=6000.0)
+    (made,) = import_files([one, two], run=run).runs
+    assert made["thrust_N"][0] == pytest.approx(2.0) and any("joined at step 0.21" in note for note in made.notes)
 
 
 def test_a_refused_file_is_2_and_the_others_are_shown(

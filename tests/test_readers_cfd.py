@@ -37,15 +37,6 @@ def monitor() -> str:
     return '"Drag Convergence"\r\n"Flow Time" "cd"\r\n' + rows
 
 
-def xy() -> str:
-    zones = []
-    for zone, shift in (("inlet", 5.0), ("x=10d", 50.0)):
-        zones.append(
-            f'((xy/key/label "{zone}")\n' + "".join(f"{0.01 * k:g}\t{shift + k:g}\n" for k in range(12)) + ")\n"
-        )
-    return '(title "Axial Velocity")\n(labels "Position" "Axial Velocity")\n\n' + "\n".join(zones)
-
-
 def forces(unit: str = "n") -> str:
     zones = {"blade:1": (-10.25, -0.5), "hub": (1.25, -0.0625), "duct": (-4.5, -0.125)}
     zones["Net"] = tuple(sum(v[k] for v in zones.values()) for k in (0, 1))  # type: ignore[assignment]
@@ -78,13 +69,8 @@ def transcript() -> str:
 
 
 def post() -> str:
-    head = "[Name]\nBlade\n\n[Data]\nX [ m ], Y [ m ], Wall Shear [ Pa ], Velocity u [ m s^-1 ], X [ m ]\n"
-    return head + "".join(f"{k}.5e-02, {k}.25e-01, {k}.125, {k + 70}.5, {k}.5e-02\n" for k in range(10))
-
-
-def ascii_nodes() -> str:
-    head = "nodenumber,    x-coordinate,    y-coordinate,        pressure\n"
-    return head + "".join(f"{k:10d},{k + 0.5:16.9E},{-k - 0.25:16.9E},{1000 + k:16.9E}\n" for k in range(1, 15))
+    head = "[Name]\nLoads\n\n[Data]\nTime [ s ], Thrust [ N ], Velocity u [ m s^-1 ], Moment [ N m ]\n"
+    return head + "".join(f"{k}.5e-02, {k}.25e-01, {k + 70}.5, {k}.125\n" for k in range(10))
 
 
 def foam_new() -> str:
@@ -114,9 +100,8 @@ def su2() -> str:
 
 
 SAMPLES: dict[str, Callable[[], str]] = {
-    "fluent_report": report, "fluent_monitor": monitor, "fluent_xy": xy, "fluent_forces": forces,
-    "fluent_transcript": transcript, "cfd_post_csv": post, "fluent_ascii": ascii_nodes, "openfoam_forces": foam_new,
-    "openfoam_forces:old": foam_old, "su2_history": su2,
+    "fluent_report": report, "fluent_monitor": monitor, "fluent_forces": forces, "fluent_transcript": transcript,
+    "cfd_post_csv": post, "openfoam_forces": foam_new, "openfoam_forces:old": foam_old, "su2_history": su2,
 }  # fmt: skip
 
 
@@ -269,18 +254,23 @@ def test_openfoam_layouts_agree(put: Callable[..., Path]) -> None:
     np.testing.assert_allclose(old["moment_total_z_Nm"], 60.75 + np.arange(1, 14))
     swapped = foam_new().replace("total_x total_y", "total_y total_x")
     assert any("is not the sum of its parts" in w for w in importers.read(put(swapped)).notes)
-    plus = "# y+ ()\n# Time \tpatch \tmin \tmax \taverage\n10\tblade\t5.5\t90\t30\n10\thub\t1\t2\t1.5\n20\tblade\t5\t91\t31\n"
-    assert importers.read(put(plus)).provenance["means"]["y_plus_average(blade)"].value == 31
 
 
-def test_points_have_no_mean(put: Callable[..., Path]) -> None:
-    for make in (post, ascii_nodes, xy):
-        assert "means" not in importers.read(put(make())).provenance
+def test_a_block_over_time_is_a_history_and_any_other_a_table_without_a_mean(put: Callable[..., Path]) -> None:
     record = importers.read(put(post()))
     assert [(k, record.unit(k)) for k in record.values] == [
-        ("x_m", "m"), ("y_m", "m"), ("wall_shear_Pa", "Pa"), ("velocity_u_m_s", "m_s")]  # fmt: skip
-    clash = post().replace("0.5e-02\n", "0.7e-02\n", 1)
-    assert "x_m#2" in importers.read(put(clash)).values
+        ("time_s", "s"), ("thrust_N", "N"), ("velocity_u_m_s", "m_s"), ("moment_Nm", "Nm")]  # fmt: skip
+    assert record.clock == "time" and record.provenance["means"]["thrust_N"].value == pytest.approx(0.475)
+    two = importers.read(put(post() + post().replace("Loads", "Duct")))
+    assert {"thrust_N(Loads)", "thrust_N(Duct)"} <= set(two.values)
+    points = importers.read(put(post().replace("Time [ s ]", "X [ m ]").replace("Thrust [ N ]", "X [ m ]")))
+    assert "means" not in points.provenance and points.clock == "none" and "x_m#2" in points.values
+    plot = '(title "Velocity")\n(labels "Position" "Velocity")\n\n((xy/key/label "inlet")\n0\t1\n1\t2\n2\t3\n)\n'
+    probes = "# Probe 0 (0.05 0 0)\n#       Probe   0\n#        Time\n0.1  (0 1 0)\n0.2  (0 2 0)\n"
+    plus = "# y+ ()\n# Time \tpatch \tmin \tmax \taverage\n10\tblade\t5.5\t90\t30\n10\thub\t1\t2\t1.5\n"
+    for text, what in ((plot, "a Fluent XY plot"), (probes, "values at probes"), (plus, r"y\+ of walls")):
+        with pytest.raises(InputError, match=f"{what}.*Write a report file"):
+            import_file(put(text))
 
 
 def test_dual_time_keeps_the_last_inner_iteration(put: Callable[..., Path]) -> None:
@@ -339,9 +329,6 @@ def test_other_dialects(put: Callable[..., Path]) -> None:
         put('"a"\n"i"\n("Iteration" "a" "flow-time")\n' + "".join(f"{k} 7 0\n" for k in range(1, 51)))
     )
     assert still.provenance["clock"] == "iteration" and len(still) == 50
-    probes = "# Probe 0 (0.05 0 0)\n# Probe 1 (0.2 0 0)\n#       Probe   0   1\n#        Time\n"
-    probes += "".join(f"{0.1 * k:g}  (0 {k} 0)  (1 2 3)\n" for k in range(1, 9))
-    np.testing.assert_allclose(importers.read(put(probes))["value_y(probe 0)"], np.arange(1, 9))
 
 
 # --- damage ----------------------------------------------------------------------------------------------------------
@@ -381,7 +368,7 @@ def mutants(rng: random.Random) -> Iterator[tuple[str, bytes, str]]:
             )
             raw = "".join(lines).encode()
         elif kind in ("column", "some", "swap"):
-            mark = "," if "," in lines[-2] else "\t" if form == "fluent_xy" else " "
+            mark = "," if "," in lines[-2] else " "
             at = rng.randrange(12)
             for k in range(first, len(lines)):
                 if kind == "some" and rng.random() < 0.7 or not re.match(r"\s*[-\d]", lines[k]):
@@ -434,7 +421,7 @@ def check(form: str, raw: bytes, kind: str, path: Path, truth: dict[str, Dataset
     record = import_file(path)
     known = truth[form]
     spoken = set(record.notes) - set(known.notes)
-    if kind in EXACT and (form, kind) != ("fluent_xy", "line"):  # a point of one curve may stand in another
+    if kind in EXACT:
         for name, values in record.values.items():
             if name not in known.values:
                 assert spoken or "°" in name, (name, kind)
@@ -485,7 +472,8 @@ def test_20000_damaged_files(tmp_path: Path, seed: int) -> None:
 REFUSED = {
     "SOURCES.md": "a text without a table", "LICENSE": "a text without a table", "laminar_cylinder.cas": "a Fluent case file",
     "laminar_cylinder.dat": "a Fluent data file", "PPTC_VP1304_CFD_report.md": "a text without a table",
-    "FFF.6.set": "solver settings of Fluent",
+    "FFF.6.set": "solver settings of Fluent", "yPlus.dat": "y+ of walls", "probes_U": "values at probes", "axial-velocity-mesh-1.xy": "a Fluent XY plot",
+    "axial-velocity-mesh-2.xy": "a Fluent XY plot", "FFT_1": "a Fluent XY plot",
 }  # fmt: skip
 
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bemt.base.errors import InputError
+from bemt.base.errors import InputError, refuse
 from bemt.data import readers as importers
 from bemt.data.readers import uiuc
 from bemt.data.readers.uiuc_names import parse_file_name
@@ -21,6 +21,13 @@ LINE = "J    CT      CP      eta\n0.200 0.0900 0.0450 0.400\n0.400 0.0700 0.0430
 
 def geometry(beta75: float = 15.0) -> str:
     return GEOMETRY.format(beta75 + 20, beta75 + 6, beta75, beta75 - 4)
+
+
+def sound(path: Path) -> list[uiuc.UiucPropeller]:
+    """Propellers of a folder without faults."""
+    folder = uiuc.scan_folder(path)
+    refuse(folder.faults)
+    return list(folder.propellers)
 
 
 def write(folder: Path, **files: str) -> Path:
@@ -84,7 +91,7 @@ def test_a_lost_decimal_point_is_refused_not_guessed(tmp_path: Path) -> None:
 
 def test_unknown_model_name_is_refused_with_a_reason(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="size 'turbo9'; expected a size such as 10x5"):
-        uiuc.read_folder(write(tmp_path, foo_turbo9_static_1rd=STATIC))
+        sound(write(tmp_path, foo_turbo9_static_1rd=STATIC))
 
 
 def test_groups_geometry_static_and_lines(tmp_path: Path) -> None:
@@ -92,7 +99,7 @@ def test_groups_geometry_static_and_lines(tmp_path: Path) -> None:
         tmp_path, apce_10x5_geom=geometry(), apce_10x5_static_pg0827=STATIC, apce_10x5_pg0829_6014=LINE,
         apce_10x5_pg0828_4014=LINE,
     )  # fmt: skip
-    (prop,) = uiuc.read_folder(tmp_path)
+    (prop,) = sound(tmp_path)
     assert (prop.name, prop.family, prop.label, prop.blades) == ("apce_10x5", "apce", "APC Thin Electric", 2)
     assert prop.geometry is not None and prop.geometry.origin == "own" and prop.geometry.beta_deg[2] == 15.0
     assert prop.static is not None and prop.static.rpm.tolist() == [2000.0, 4000.0] and prop.static.run == "pg0827"
@@ -101,20 +108,9 @@ def test_groups_geometry_static_and_lines(tmp_path: Path) -> None:
     assert prop.diameter_m == pytest.approx(0.254)
 
 
-def test_series_has_every_point_with_its_source(tmp_path: Path) -> None:
-    write(tmp_path, apce_10x5_static_pg0827=STATIC, apce_10x5_pg0828_4014=LINE)
-    (prop,) = uiuc.read_folder(tmp_path)
-    s = uiuc.to_series(prop)
-    assert s.kind == "bench" and len(s) == 5
-    assert s["rpm"].tolist() == [2000.0, 4000.0, 4014.0, 4014.0, 4014.0]
-    assert s["J"].tolist() == [0.0, 0.0, 0.2, 0.4, 0.6] and s["eta"][:2].tolist() == [0.0, 0.0]
-    assert s.labels[0] == "apce_10x5_static_pg0827.txt:2" and s.labels[-1] == "apce_10x5_pg0828_4014.txt:4"
-    assert np.all(np.isnan(s.u["CT"])) and len(s.provenance["sha256"]) == 2
-
-
 def test_two_static_runs_are_joined(tmp_path: Path) -> None:
     write(tmp_path, apce_10x5_static_a1234=STATIC, apce_10x5_static_b1235=STATIC)
-    (prop,) = uiuc.read_folder(tmp_path)
+    (prop,) = sound(tmp_path)
     assert len(prop.statics) == 2 and prop.static is not None and len(prop.static.rpm) == 4
 
 
@@ -124,7 +120,7 @@ def test_shared_rotated_and_design_geometry(tmp_path: Path) -> None:
         nr640_9_20deg_static_02ab=STATIC, nr640_5_20deg_static_03ab=STATIC, nr640_geom=geometry(15.0),
         nr640_thick="r/R t/c\n0.3 0.35\n0.95 0.08\n",
     )  # fmt: skip
-    by_name = {p.name: p for p in uiuc.read_folder(tmp_path)}
+    by_name = {p.name: p for p in sound(tmp_path)}
     assert set(by_name) == {"nr640_9_15deg", "nr640_9_15deg_3b", "nr640_9_20deg", "nr640_5_20deg"}
     found = {n: (p.geometry.origin, round(p.geometry.rotation_deg, 9)) for n, p in by_name.items() if p.geometry}
     assert found == {
@@ -141,7 +137,7 @@ def test_pitch_variants_turn_by_the_nominal_angle(tmp_path: Path) -> None:
     (tmp_path / "da4052_9x6.75_geom.txt").write_text(geometry(18.8))
     (tmp_path / "da4052_9x4.76_static_1060rd.txt").write_text(STATIC)
     (tmp_path / "da4052_9x8.95_static_1066ga.txt").write_text(STATIC)
-    by_name = {p.name: p.geometry for p in uiuc.read_folder(tmp_path)}
+    by_name = {p.name: p.geometry for p in sound(tmp_path)}
     low, high = by_name["da4052_9x4.76"], by_name["da4052_9x8.95"]
     assert low is not None and high is not None
     # the site heads these "-5 deg" and "+5 deg" of 9x6.75
@@ -150,7 +146,7 @@ def test_pitch_variants_turn_by_the_nominal_angle(tmp_path: Path) -> None:
 
 def test_other_families_never_lend_geometry(tmp_path: Path) -> None:
     write(tmp_path, apce_10x5_geom=geometry(), apce_10x7_static_1234ab=STATIC)
-    by_name = {p.name: p for p in uiuc.read_folder(tmp_path)}
+    by_name = {p.name: p for p in sound(tmp_path)}
     assert by_name["apce_10x7"].geometry is None
 
 
@@ -168,7 +164,7 @@ def test_volumes_stay_apart(tmp_path: Path) -> None:
         (tmp_path / volume / "data").mkdir(parents=True)
         write(tmp_path / volume / "data", gwsdd_9x5_static_0797rd=STATIC)
     write(tmp_path / "volume-1" / "data", gwsdd_9x5_geom=geometry())
-    one, two = uiuc.read_folder(tmp_path)
+    one, two = sound(tmp_path)
     assert one.name == two.name and one.folder != two.folder
     assert one.geometry is not None and two.geometry is None
 
@@ -237,10 +233,9 @@ def test_foreign_files_are_named_not_swallowed(tmp_path: Path) -> None:
 
 def test_the_extension_decides_nothing(tmp_path: Path) -> None:
     (tmp_path / "apce_9x6_static_1ab.dat").write_text(STATIC)
-    (prop,) = uiuc.read_folder(tmp_path)
+    (prop,) = sound(tmp_path)
     assert prop.static is not None
     assert isinstance(importers.read(tmp_path / "apce_9x6_static_1ab.dat"), uiuc.UiucStatic)
-    assert importers.detect(tmp_path) == "uiuc"
 
 
 def test_registry_finds_importers_and_asks_when_two_match(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -285,14 +280,14 @@ def test_the_whole_archive_imports(shared_data: Path, volume: str, propellers: i
     assert not folder.faults and not folder.ignored
     assert len(folder.propellers) == propellers
     assert sum(len(p.lines) for p in folder.propellers) == lines
-    assert sum(len(uiuc.to_series(p)) for p in folder.propellers) == points
+    assert sum(t.CT.size for p in folder.propellers for t in (*p.statics, *p.lines)) == points
     for p in folder.propellers:
         assert 2.0 < p.diameter_in < 20.0 and len(p.statics) == 1
         assert p.geometry is None or p.geometry.r_R[-1] == 1.0
 
 
 def test_volume_2_has_geometry_for_every_propeller(shared_data: Path) -> None:
-    props = {p.name: p for p in uiuc.read_folder(shared_data / "uiuc" / "volume-2")}
+    props = {p.name: p for p in sound(shared_data / "uiuc" / "volume-2")}
     assert all(p.geometry is not None for p in props.values())
     assert {n for n, p in props.items() if p.geometry and p.geometry.origin != "own"} == {
         "nr640_5_15deg_3b", "nr640_5_15deg_4b", "nr640_5_20deg",

@@ -75,7 +75,7 @@ def import_(
     density_kg_m3 : float, optional
         Density of the fluid. [kg/m3]
     reference : mapping
-        What coefficients rest on: area=A length=L speed=V density=RHO sound=A, in m2, m, m/s, kg/m3. Forces are
+        What coefficients rest on: area=A length=L speed=V density=RHO, in m2, m, m/s, kg/m3. Forces are
         multiplied by the density of the run over that one: OpenFOAM's of rhoInf 1 with density=1.
     setup : mapping
         How it was computed: cells=2.1e6 grid_level=fine turbulence='k-omega SST' solver=pressure steady=no gci_pct=2

@@ -7,7 +7,6 @@ A reader is a module of this package that defines
 * ``read(path) -> Dataset`` : the rows of the file, samples or points, in SI, or :class:`bemt.base.errors.InputError`
   with all its faults. Use :class:`bemt.data.readers.recording.Builder` or :func:`bemt.data.readers.samples.dataset`.
   Readers of blades and polars return the object of their own package instead;
-* optionally ``sniff_folder(path) -> bool`` : True if ``read`` also takes that folder;
 * optionally ``FALLBACK = True`` : used only if no other reader claims the file.
 
 or ``READERS``, a tuple of :class:`Reader` or of objects like it, where several formats share a file.
@@ -28,7 +27,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NoReturn, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -36,6 +35,7 @@ from bemt.base import plugins
 from bemt.base.errors import Fault, InputError, system_fault
 from bemt.base.packed import MAX_BYTES, packed, part_of, unpacked
 from bemt.base.toml_text import Collector
+from bemt.data.readers.marks import instead
 
 __all__ = [
     "HEAD_BYTES", "Reader", "SourceText", "decode", "detect", "head_text", "importers", "load_text", "number", "read",
@@ -308,12 +308,12 @@ def importers() -> Mapping[str, Importer]:
 
 
 def detect(path: str | os.PathLike[str]) -> str:
-    """Detect the format of a file or folder from its content.
+    """Detect the format of a file from its content.
 
     Parameters
     ----------
     path : str or path
-        File or folder.
+        The file.
 
     Returns
     -------
@@ -327,31 +327,31 @@ def detect(path: str | os.PathLike[str]) -> str:
     """
     place, target, known = Collector(os.fspath(path)), Path(path), importers()
     if target.is_dir():
-        whole = {k: m for k, m in known.items() if hasattr(m, "sniff_folder")}
-        kinds = [k for k, m in whole.items() if m.sniff_folder(target)]
-        if not kinds:
-            inside = target / "recording.toml"
-            hint = f"Give {inside.as_posix()}" if inside.is_file() else "Name the files in it"
-            place.refuse("", "a folder", f"a file, or a folder that a reader takes whole ({', '.join(whole)})", hint)
-    else:
-        head = _head(target, place)
-        if not head.strip():
-            place.refuse("", "an empty file", "results as a table of text", "Did the export finish?")
-        kinds = [k for k, m in known.items() if m.sniff(head)]
-        kinds = [k for k in kinds if not getattr(known[k], "FALLBACK", False)] or kinds
-        if not kinds:
-            _unknown(target, head, place)
+        inside = target / "recording.toml"
+        hint = f"Give {inside.as_posix()}" if inside.is_file() else "Name the files in it"
+        place.refuse("", "a folder", "a file", hint)
+    head = _head(target, place)
+    if not head.strip():
+        place.refuse("", "an empty file", "results as a table of text", "Did the export finish?")
+    claimed = [k for k, m in known.items() if m.sniff(head)]
+    if not (kinds := [k for k in claimed if not getattr(known[k], "FALLBACK", False)]):
+        _refuse_known(target, head, place, bool(claimed))
+        kinds = claimed
     if len(kinds) > 1:
         hint = " or ".join(f'format = "{kind}"' for kind in kinds)
         place.refuse("", f"content claimed by {', '.join(kinds)}", "one format", f"Give {hint}")
     return kinds[0]
 
 
-def _unknown(target: Path, head: bytes, place: Collector) -> NoReturn:
-    """Refuse a file that no reader claims, with what reads it or what it is."""
-    for command, where in plugins.offered("FILE_KINDS").items():
+def _refuse_known(target: Path, head: bytes, place: Collector, a_table: bool) -> None:
+    """Refuse a file that only the reader of tables claims where it is something else, and any that none claims."""
+    for command, where in plugins.offered("FILE_KINDS").items() if not a_table else ():
         if kind := plugins.load(where)(target):
             place.refuse("", kind, "a recording of a stand", f"It is read by {command} {target}")
+    if told := instead(head, a_table):
+        place.refuse("", *told)
+    if a_table:
+        return
     if _binary(head):
         place.refuse("", "binary data (NUL bytes)", "a text file", "Export the data as plain text (CSV)")
     hint = "Give --format (format = in a case) if its head is unusual"
@@ -367,16 +367,16 @@ def _head(target: Path, place: Collector) -> bytes:
             head = stream.read(HEAD_BYTES)
         return unpacked(load_bytes(target), place.file, HEAD_BYTES) if part or packed(head) else head
     except OSError as error:
-        raise InputError(system_fault(error, place.file, "a readable file or folder")) from error
+        raise InputError(system_fault(error, place.file, "a readable file")) from error
 
 
 def read(path: str | os.PathLike[str], format: str | None = None) -> Any:  # noqa: A002 - the key of the case file
-    """Read a file or folder with the reader of its format.
+    """Read a file with the reader of its format.
 
     Parameters
     ----------
     path : str or path
-        File or folder.
+        The file.
     format : str or None
         Kind of the reader; None detects it from the content.
 

@@ -1,15 +1,15 @@
-r"""Tables that ANSYS exports: CSV of CFD-Post, nodes of Fluent, design points of Workbench.
+r"""Tables that ANSYS exports: CSV of CFD-Post, design points of Workbench.
 
 CFD-Post writes blocks of ``[Name]`` and ``[Data]``, units in the headings; or expressions with their values.
 
 ::
 
     [Name]
-    Blade
+    Thrust
 
     [Data]
-    X [ m ], Y [ m ], Z [ m ], Wall Shear [ Pa ]
-    7.69e-02, 5.98e-02, 8.56e-02, 3.79
+    Time [ s ], Thrust [ N ]
+    1.25e-02, 3.79
 
 A table of expressions (of CFD-Post and CFX) has one on each line, under a heading or none::
 
@@ -28,12 +28,11 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.tables import number_of
-from bemt.data.readers import Reader, SourceText, begins, load_text, number
+from bemt.data.readers import Reader, SourceText, load_text, number
 from bemt.data.readers.cfd import (
     Column,
     ExportRow,
     cells_of,
-    fields,
     head_lines,
     history,
     made_of,
@@ -162,48 +161,14 @@ def _block(source: SourceText, lines: list[tuple[int, str]]) -> Dataset:
         got = f"numbers ({', '.join(names[:4])})"
         source.refuse(lines[0][0], got, "headings such as X [ m ]", "Is the head cut?")
     columns = [_heading(cell) for cell in names]
-    return _surface(CFD_POST_CSV, source, lines, mark, columns, no_units(columns))
-
-
-def _surface(
-    form: str, source: SourceText, lines: list[tuple[int, str]], mark: str | None, columns: list[Column],
-    notes: list[str],
-) -> Dataset:  # fmt: skip
-    """Values at points, or a history, under a line of headings that each surface of a file may repeat."""
-    rows = [ExportRow(line, cells_of(text, mark)) for line, text in lines]
-    body = [row for row in rows[1:] if row.cells != rows[0].cells]
-    again = len(rows) - 1 - len(body)
+    rows = [ExportRow(line, cells_of(text, mark)) for line, text in lines[1:] if cells_of(text, mark) != names]
+    again = len(lines) - 1 - len(rows)
     told = [f"headings repeated {number_of(again, 'time')}: several surfaces in one file"] if again else []
-    build = history if columns[0].role == "time" else fields
-    return build(form, source, columns, numeric_table(source, columns, body, commas=mark != ","), [*told, *notes])
-
-
-# Fluent's ASCII export of a surface or zone: ``nodenumber, x-coordinate, ...``, comma or blanks between cells.
-#
-# ::
-#
-#     nodenumber,    x-coordinate,    y-coordinate,        pressure
-#              1, 8.427639012E-17,-7.500000000E-01,-3.011805813E-01
-#
-# Fluent exports in SI whatever units it displays, but the file does not say so; units stay open. Coordinates and fields
-# are values at points, which carry no areas: forces cannot be summed from them.
-
-FLUENT_ASCII = "fluent_ascii"
-
-sniff_fluent_ascii = begins(r"\s*\"*(nodenumber|cellnumber)")
-
-
-def read_fluent_ascii(path: str | os.PathLike[str]) -> Dataset:
-    """Read an ASCII export."""
-    source = load_text(path)
-    lines = [(k, text.strip()) for k, text in enumerate(source.lines, 1) if text.strip()]
-    if not lines or not sniff_fluent_ascii(lines[0][1]):
-        got = repr(lines[0][1][:60]) if lines else "no text"
-        source.refuse(1, got, "a header that begins with nodenumber or cellnumber")
-    mark = next((m for m in (",", ";") if m in lines[0][1]), None)
-    names = cells_of(lines[0][1], mark)
-    columns = [Column(name or "unnamed", "", "value" if k else "index") for k, name in enumerate(names)]
-    return _surface(FLUENT_ASCII, source, lines, mark, columns, ["no units stated (Fluent exports SI)"])
+    table, notes = numeric_table(source, columns, rows, commas=mark != ","), [*told, *no_units(columns)]
+    if columns[0].role == "time":
+        return history(CFD_POST_CSV, source, columns, table, notes)
+    about = {**source.about, "clock": "none"}
+    return dataset(CFD_POST_CSV, "cfd", made_of(columns, table.values.T), [*notes, *table.warnings], about)
 
 
 # Design points of Ansys Workbench as CSV: one operating point a row.
@@ -289,6 +254,5 @@ def _headed(name: str) -> tuple[str, str]:
 
 READERS = (
     Reader(CFD_POST_CSV, sniff_cfd_post_csv, read_cfd_post_csv),
-    Reader(FLUENT_ASCII, sniff_fluent_ascii, read_fluent_ascii),
     Reader(DESIGN_POINTS, sniff_design_points, read_design_points),
 )

@@ -35,7 +35,6 @@ from bemt.physics.dataset import Dataset
 KIND = "apc"
 SOURCE = "APC Propellers (Landing Products), published data file"
 _PE0_COLUMNS = ("station", "chord", "pitch quoted", "pitch le-te", "sweep", "thickness", "twist", "max-thick")
-_PE0_MORE = {"zhigh": 0.0, "pitch prather": math.nan}
 _PER3_COLUMNS = "v j pe ct cp pwr torque thrust pwr torque thrust thr/pwr mach reyn fom".split()
 _TOKEN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:NaN|Inf(?:inity)?)|\*+", re.IGNORECASE)
 
@@ -47,25 +46,16 @@ class ApcBlade:
     # Designation (``10x5E``) and version line
     name: str
     version: str
-    # Nominal diameter and pitch, tip radius, radius of the hub transition [m]
+    # Nominal diameter and pitch, tip radius [m]
     diameter_m: float
     pitch_m: float
     radius_m: float
-    hub_radius_m: float
     blades: int  # Number of blades
     # (N,) stations ascending in radius [m], chord [m], twist between the LE and TE parting lines [rad]
     r_m: Array
     chord_m: Array
     beta_rad: Array
     t_c: Array  # (N,) thickness over chord
-    # (N,) leading edge ahead of the radial line; highest point of the upper surface [m]
-    sweep_m: Array
-    z_high_m: Array
-    # (N,) pitch as quoted, and as a gauge on the lower surface reads it [m]
-    pitch_quoted_m: Array
-    pitch_prather_m: Array
-    # Radius [m] where the transition from the first to the last section starts and ends, with the section names
-    airfoils: tuple[tuple[float, str], ...]
     notes: tuple[str, ...]  # Remarks of the file, such as "APC12 airfoil is equivalent to NACA 4412"
     provenance: Mapping[str, Any]  # source, file, sha256, remark
 
@@ -154,7 +144,7 @@ def _pe0_columns(source: SourceText) -> tuple[int, list[str]]:
 
 
 def _pe0_rows(source: SourceText, at: int, names: list[str]) -> list[Array]:
-    """Columns `_PE0_COLUMNS` and `_PE0_MORE` of the station table up to the first blank line after it."""
+    """Radii, chords, thickness ratios and twists of the station table up to the first blank line after it."""
     rows: dict[int, list[float]] = {}
     for index, line in enumerate(source.lines[at:], at + 1):
         tokens = line.split()
@@ -177,7 +167,7 @@ def _pe0_rows(source: SourceText, at: int, names: list[str]) -> list[Array]:
     if missing := [name for name in _PE0_COLUMNS if name not in table]:
         source.add(at, f"no column {', '.join(missing)}", f"columns {', '.join(_PE0_COLUMNS)}")
         return []
-    r, chord, _, le_te, _, t_c, twist_deg, thickness = columns = [table[name] for name in _PE0_COLUMNS]
+    r, chord, _, le_te, _, t_c, twist_deg, thickness = [table[name] for name in _PE0_COLUMNS]
     twist = np.degrees(np.arctan2(le_te, 2 * math.pi * r))
     tests = [
         (np.diff(r, prepend=0.0) <= 0, "radii that do not ascend", "ascending radii [in]"),
@@ -188,7 +178,7 @@ def _pe0_rows(source: SourceText, at: int, names: list[str]) -> list[Array]:
     for bad_rows, got, expected in tests:
         for i in np.flatnonzero(bad_rows)[:1]:
             source.add(lines[i], got, expected, "Have columns shifted, or units changed?")
-    return [*columns, *(table.get(name, np.full_like(r, absent)) for name, absent in _PE0_MORE.items())]
+    return [r, chord, t_c, twist_deg]
 
 
 def read_pe0(path: str | os.PathLike[str]) -> ApcBlade:
@@ -205,7 +195,7 @@ def read_pe0(path: str | os.PathLike[str]) -> ApcBlade:
             got = f"{key}: {match[1]}" if match else f"no line {key}:"
             source.add(key, got, f"a number from {low:g} to {high:g}", "Is the file cut off?")
         tail.append(math.nan if value is None else value)
-    R, Rhub, blades = tail
+    R, _, blades = tail
     if abs(2 * R - diameter_in) > 0.03 * diameter_in:
         expected = f"the diameter of {name}, {diameter_in:g} in"
         source.add("RADIUS", f"{2 * R:g} in", expected, "Do name and data belong together?")
@@ -213,21 +203,17 @@ def read_pe0(path: str | os.PathLike[str]) -> ApcBlade:
         got = f"a station at {columns[0][-1]:g} in"
         source.add("RADIUS", got, f"stations up to {R:g} in", "Have units changed?")
     source.check()
-    r, chord, quoted, _, sweep, t_c, twist_deg, _, z_high, prather = columns
+    r, chord, t_c, twist_deg = columns
     inch = units.INCH
     version = re.search(r"^\s*(v\d{4}\S*)", source.text, re.MULTILINE)
-    sections = re.findall(r"^\s*AIRFOIL\d+:\s*([\d.]+)\s*,\s*(\S.*?)\s*(?:\(|$)", source.text, re.MULTILINE)
     notes = tuple(re.findall(r"^\s*NOTE:\s*(.*?)\s*$", source.text, re.MULTILINE))
     remark = (
         f"{number_of(len(names), 'column')}; blade number by the name {blades_named}" if blades_named != blades else ""
     )
     return ApcBlade(
         name=name, version=version[1] if version else "", diameter_m=diameter_in * inch, pitch_m=pitch_in * inch,
-        radius_m=R * inch, hub_radius_m=Rhub * inch, blades=int(blades), r_m=r * inch, chord_m=chord * inch,
-        beta_rad=np.radians(twist_deg), t_c=t_c, sweep_m=sweep * inch, z_high_m=z_high * inch,
-        pitch_quoted_m=quoted * inch, pitch_prather_m=prather * inch,
-        airfoils=tuple((float(at_r) * inch, section) for at_r, section in sections), notes=notes,
-        provenance={"source": SOURCE, **source.about, "remark": remark},
+        radius_m=R * inch, blades=int(blades), r_m=r * inch, chord_m=chord * inch, beta_rad=np.radians(twist_deg),
+        t_c=t_c, notes=notes, provenance={"source": SOURCE, **source.about, "remark": remark},
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-r"""What the readers of CFD exports share: tables that may be damaged, histories with a clock, and values at points.
+r"""What the readers of CFD exports share: tables that may be damaged, and histories with a clock.
 
 The rules, once for all formats: columns are matched by the header; a row whose cells do not fit the header is never
 shifted into place but left out with a warning, and a file in which more than a few rows do not fit is refused; text
@@ -21,7 +21,7 @@ from bemt.base.averaging import Mean, keep_last, steady_average
 from bemt.base.errors import Fault
 from bemt.base.tables import number_of
 from bemt.data.readers import SourceText, head_text, number, unit_text
-from bemt.data.readers.samples import Channel, channels_of, dataset
+from bemt.data.readers.samples import Channel, dataset
 from bemt.physics.dataset import Dataset
 
 _NAN = re.compile(r"[+-]?(nan|n/a|-?1\.#(qnan|snan|ind|inf)\w*|inf(inity)?|null|\*+)(\(\w*\))?", re.IGNORECASE)
@@ -48,7 +48,7 @@ class Column:
     name: str
     unit: str = ""
     role: str = "value"
-    """value, step (counts), time (seconds) or index (a number of a node)."""
+    """value, step (counts) or time (seconds)."""
 
 
 @dataclass(frozen=True)
@@ -331,37 +331,3 @@ def _clock(values: Array, roles: Sequence[str], role: str) -> int | None:
         if own == role and (len(values) == 1 or len(np.unique(values[np.isfinite(values[:, k]), k])) > 1):
             return k
     return None
-
-
-def fields(
-    format: str, source: SourceText, columns: Sequence[Column], table: ExportTable,  # noqa: A002
-    warnings: Sequence[str] = (), provenance: Mapping[str, str] | None = None,
-) -> Dataset:  # fmt: skip
-    """Make the record of values at points: no means, since points carry no area; equal repeated columns appear once."""
-    notes = [*warnings, *table.warnings]
-    first, arrays = dict[str, Array](), list[Array]()
-    kept: list[Column] = []
-    for column, values in zip(columns, table.values.T, strict=True):
-        twin = first.setdefault(column.name, values)
-        if twin is not values and np.array_equal(twin, values, equal_nan=True):
-            notes.append(f"column {column.name} is repeated with the same values: taken once")
-        else:
-            kept.append(column)
-            arrays.append(values)
-    channels = made_of(kept, arrays)
-    for name in channels:
-        if "#" in name:
-            notes.append(f"two columns are named {name.split('#')[0]} and differ: the later one is {name}")
-    notes.append("values at points: no mean is taken, since points carry no areas")
-    about = {**source.about, **(provenance or {}), "clock": "none"}
-    return dataset(format, "cfd", channels, notes, about)
-
-
-def side_by_side(parts: Iterable[tuple[str, Dataset]]) -> tuple[dict[str, Channel], list[str]]:
-    """Channels of several tables of one file, each with the label of its table behind its name, and their notes."""
-    channels: dict[str, Channel] = {}
-    notes: list[str] = []
-    for label, record in parts:
-        channels |= {f"{name}({label})": channel for name, channel in channels_of(record).items()}
-        notes += [f"{label}: {text}" for text in record.notes]
-    return channels, notes

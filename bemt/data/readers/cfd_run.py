@@ -95,7 +95,6 @@ class ReferenceTable(Table):
     length_m: float | None = entry("length of moments", "m", 1e-6, 1e4)
     speed_m_s: float | None = entry("speed", "m/s", 1e-3, 2000.0)
     density_kg_m3: float | None = entry("density; loads in units go with that of the run", "kg/m3", 0.01, 1100.0)
-    sound_m_s: float | None = entry("speed of sound, of disks in Flow360", "m/s", 1.0, 6000.0)
 
 
 class SetupTable(Table):

@@ -38,25 +38,12 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.data.readers import Reader, SourceText, load_text
-from bemt.data.readers.cfd import (
-    Column,
-    ExportRow,
-    ExportTable,
-    cells_of,
-    head_lines,
-    history,
-    made_of,
-    numeric_table,
-    si_unit,
-    side_by_side,
-    unique,
-)
-from bemt.data.readers.samples import dataset
+from bemt.data.readers import load_text
+from bemt.data.readers.cfd import Column, ExportRow, ExportTable, cells_of, head_lines, history, numeric_table, si_unit
 from bemt.physics.dataset import Dataset
 
 
@@ -215,107 +202,7 @@ def outermost(columns: list[Column], table: ExportTable, notes: list[str]) -> tu
     return columns, table
 
 
-# Fluent XY plots: ``(title ...)``, ``(labels "x" "y")``, then one list of pairs for each zone.
-#
-# ::
-#
-#     (title "Axial Velocity")
-#     (labels "Position" "Axial Velocity")
-#
-#     ((xy/key/label "inlet")
-#     0	0.2
-#     )
-
-FLUENT_XY = "fluent_xy"
-
-_LABELS = re.compile(r'\(labels\s+"([^"]*)"\s+"([^"]*)"\s*\)')
-_ZONE = re.compile(r'\(\(xy/key/label\s+("[^"]*"|[^\s"()]+)\s*\)(?:\s*\((?:xy/key/visible\?|[\w/?-]+)[^)]*\))*')
-_FLUENT_XY_UNIT = re.compile(r"\s*[\[(]\s*([^\])]*?)\s*[\])]\s*$")
-
-
-def sniff_fluent_xy(head: bytes | str) -> bool:
-    r"""Tell whether the file begins with a title and labels in parentheses.
-
-    >>> sniff_fluent_xy('(title "a")\n(labels "x" "y")\n'), sniff_fluent_xy('("Iteration" "drag")')
-    (True, False)
-    """
-    lines = head_lines(head, 6)
-    return any(line.startswith("(labels ") for line in lines) and lines[0].startswith(("(title", "(labels"))
-
-
-def read_fluent_xy(path: str | os.PathLike[str]) -> Dataset:
-    """Read an XY plot."""
-    source = load_text(path)
-    title = ""
-    labels: list[str] = []
-    zones: list[tuple[str, list[ExportRow]]] = []
-    closed = True
-    for line, raw in enumerate(source.lines, 1):
-        text = raw.strip()
-        match = _LABELS.fullmatch(text)
-        zone = _ZONE.fullmatch(text)
-        if not text:
-            continue
-        if match:
-            labels = [match[1].strip() or "x", match[2].strip() or "y"]
-        elif text.startswith("(title"):
-            title = text[6:].strip().strip(')"').strip()
-        elif zone:
-            zones.append((zone[1].strip('"'), []))
-            closed = False
-        elif text == ")":
-            closed = True
-        elif closed:
-            expected = '(labels "x" "y") and lists that begin with ((xy/key/label "zone")'
-            source.refuse(line, repr(text[:60]), expected, "Is the file damaged?")
-        else:
-            zones[-1][1].append(ExportRow(line, tuple(text.split())))
-    if not labels or not zones:
-        got = "no (labels ...)" if not labels else "no list of points"
-        source.refuse("", got, 'labels and a list ((xy/key/label "zone") ... )')
-    return _record(source, title, labels, zones, closed)
-
-
-def _column(label: str) -> Column:
-    """Column of an axis label; a label may end in its unit."""
-    match = _FLUENT_XY_UNIT.search(label)
-    name = label[: match.start()].strip() if match else label
-    column = column_of(name or label)
-    if column.role == "time" and match and match[1] not in ("s", "sec", "seconds", ""):  # no clock in seconds
-        return Column(label, match[1])
-    return column if column.role != "value" else replace(column, name=label)
-
-
-def _record(
-    source: SourceText, title: str, labels: list[str], zones: list[tuple[str, list[ExportRow]]], closed: bool
-) -> Dataset:
-    columns = [_column(label) for label in labels]
-    counts = columns[0].role in ("step", "time")
-    notes: list[str] = [] if closed else ["the last list is not closed: the file may be cut"]
-    parts: dict[str, Dataset] = {}
-    for name, (_, data) in zip(unique([zone for zone, _ in zones]), zones, strict=True):
-        if not data:
-            notes.append(f"{name}: no points")
-            continue
-        table = numeric_table(source, columns, data)
-        of_curve = dataset(FLUENT_XY, "cfd", made_of(columns, table.values.T), table.warnings)
-        parts[name] = history(FLUENT_XY, source, columns, table) if counts else of_curve
-    channels, more = side_by_side(parts.items())
-    notes += more
-    if not channels:
-        source.refuse("", "no points", "one pair of numbers or more")
-    about = {**source.about, "title": title, "clock": "none"}
-    if counts:
-        clocks = [f"{columns[0].name}({name})" for name in parts]
-        about |= {"clock": "time" if columns[0].role == "time" else "iteration", "clock_channels": "\t".join(clocks)}
-        about |= {"time_channel": clocks[0]} if columns[0].role == "time" and len(clocks) == 1 else {}
-    else:
-        notes.append("a curve over a position or frequency: no mean is taken")
-    return dataset(FLUENT_XY, "cfd", channels, notes, about)
-
-
-READERS: tuple[Layout | Reader, ...] = (
-    Reader(FLUENT_XY, sniff_fluent_xy, read_fluent_xy),
+READERS = (
     Layout(
         "fluent_report", '("Time Step" "thrust" "flow-time") in line 3',
         lambda line: [name.strip() for name in _QUOTED.findall(line)] if _REPORT.fullmatch(line) else None, skip='"',

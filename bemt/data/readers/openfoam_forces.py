@@ -1,4 +1,4 @@
-r"""OpenFOAM ``postProcessing`` tables: forces and moments of both layouts, coefficients, y+, other named columns.
+r"""OpenFOAM ``postProcessing`` tables: forces and moments of both layouts, coefficients, other named columns.
 
 New layout (``force.dat``, ``moment.dat``)::
 
@@ -19,23 +19,19 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.base.averaging import Mean
 from bemt.base.tables import number_of
 from bemt.data.readers import SourceText, load_text
-from bemt.data.readers.cfd import Column, ExportRow, ExportTable, head_lines, history, numeric_table, side_by_side
-from bemt.data.readers.samples import Channel, dataset
+from bemt.data.readers.cfd import Column, ExportRow, ExportTable, head_lines, history, numeric_table
 from bemt.physics.dataset import Dataset
 
 KIND = "openfoam_forces"
 
-_TIME = re.compile(r"#\s*Time\b(.*)")
-_PROBE = re.compile(r"#\s*Probe\s+(\d+)\s+\(([^()]*)\)")
+_TIME = re.compile(r"#\s*Time\b(?!\s+patch\b)(.*)")
 _NESTED = re.compile(r"(\w+)\(([^()]*)\)")
 _SETTING = re.compile(r"#\s*(\w+)\s*:\s*(.+)")
 _PROPELLER: dict[str, tuple[str, str, float]] = {
@@ -55,31 +51,26 @@ def sniff(head: bytes | str) -> bool:
     (True, False, True)
     """
     lines = [line for line in head_lines(head) if line.startswith("#")]
-    return any(_PROBE.match(line) or ((m := _TIME.fullmatch(line)) and m[1].strip()) for line in lines)
+    return any((m := _TIME.fullmatch(line)) and m[1].strip() for line in lines)
 
 
 @dataclass
 class _Head:
-    """Comment lines: title, settings, probes and their places, the line of columns."""
+    """Comment lines: title, settings, the line of columns."""
 
     source: SourceText
     title: str = ""
     columns: str = ""
     repeated: int = 0
     settings: dict[str, str] = field(default_factory=dict)
-    probes: dict[str, str] = field(default_factory=dict)
-    vectors: bool = False  # at probes
 
     def take(self, line: int, text: str) -> None:
         """Read one of them."""
-        if probe := _PROBE.match(text):
-            self.probes[probe[1]] = probe[2]
-        elif (time := _TIME.fullmatch(text)) and (time[1].strip() or self.probes):
-            found = " ".join(time[1].split())
-            if found and self.columns not in ("", found):
+        if (time := _TIME.fullmatch(text)) and (found := " ".join(time[1].split())):
+            if self.columns not in ("", found):
                 self.source.refuse(line, "another header", "the first one", "Split the file there")
-            self.repeated += bool(found and self.columns)
-            self.columns = found or f"probes {' '.join(self.probes)}"
+            self.repeated += bool(self.columns)
+            self.columns = found
         elif setting := _SETTING.fullmatch(text):
             self.settings[setting[1]] = setting[2].strip()
         elif not self.title:
@@ -89,10 +80,6 @@ class _Head:
 def _columns(top: _Head) -> tuple[list[Column], str]:
     """Columns of a header, and the parentheses of a row with one mark for each cell; "" for a row that needs none."""
     time, header = Column("Time", "", "time"), top.columns
-    if top.probes:
-        parts = ("_x", "_y", "_z") if top.vectors else ("",)
-        columns = [time, *(Column(f"value{p}(probe {k})") for k in top.probes for p in parts)]
-        return columns, "n" + ("(nnn)" if top.vectors else "n") * len(top.probes)
     nested = _NESTED.findall(header)
     if nested and all(re.fullmatch(r"(local)?(forces?|moments?)", name, re.IGNORECASE) for name, _ in nested):
         groups = [(name.lower().removesuffix("s"), re.split(r"[,\s]+", parts.strip())) for name, parts in nested]
@@ -129,14 +116,8 @@ def read(path: str | os.PathLike[str]) -> Dataset:
         hint = "Their sum is in the forces (or force and moment) file in the same folder"
         source.refuse("", "forces in bins along a direction", "forces of the whole", hint)
     notes = [f"header repeated {number_of(top.repeated, 'time')}: the run was restarted"] if top.repeated else []
-    if header.split()[0] == "patch" and not top.probes:
-        return _by_patch(source, header.split(), rows, about, notes)
-    top.vectors = bool(top.probes and rows) and "(" in rows[0][1]
     columns, shape = _columns(top)
     table = numeric_table(source, columns, [_row(line, text, shape, len(columns)) for line, text in rows], commas=False)
-    if top.probes:
-        where = "; ".join(f"probe {k} at ({at})" for k, at in top.probes.items())
-        about, notes = {"title": "probes", "probes": where}, [*notes, "the file states no unit"]
     if {"KT", "10*KQ"} <= {c.name for c in columns}:
         own = [_PROPELLER.get(c.name, (c.name, c.unit, 1.0)) for c in columns]
         table = replace(table, values=table.values * np.array([factor for _, _, factor in own]))
@@ -191,27 +172,3 @@ def _totals(columns: list[Column], table: ExportTable, notes: list[str]) -> tupl
                 where = f"{number_of(off.size, 'row')} (first: line {table.lines[off[0]]})" if off.size else ""
                 notes += [f"{name} is not the sum of its parts in {where}"] if where else []
     return [*columns, *more], replace(table, values=np.column_stack([table.values, *more.values()]))
-
-
-def _by_patch(
-    source: SourceText, names: list[str], rows: Sequence[tuple[int, str]], about: dict[str, str], notes: list[str]
-) -> Dataset:
-    """Table with a patch in the second column (yPlus): one channel for each patch and column."""
-    columns = [Column("Time", "", "step"), *(Column(name) for name in names[1:])]
-    patches: dict[str, list[ExportRow]] = {}
-    for line, text in rows:
-        cells = text.split()
-        patches.setdefault(cells[1] if len(cells) > 1 else "?", []).append(ExportRow(line, (cells[0], *cells[2:])))
-    if not patches:
-        source.refuse("", "no rows", "one patch or more")
-    tables = {
-        p: history(KIND, source, columns, numeric_table(source, columns, own, False)) for p, own in patches.items()
-    }
-    found, more = side_by_side(tables.items())
-    prefix = "y_plus" if "y+" in about.get("title", "") else about.get("title", "").strip() or "value"
-    channels: dict[str, Channel] = {}
-    for name, c in found.items():
-        if not name.startswith("Time("):
-            last = float(c.values[-1])
-            channels[f"{prefix}_{name}"] = Channel(c.values, "", Mean(last, "last row") if np.isfinite(last) else None)
-    return dataset(KIND, "cfd", channels, [*notes, *more], {**source.about, **about, "clock": "none"})

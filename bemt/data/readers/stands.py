@@ -1,4 +1,4 @@
-"""Stands and databases by name: thrust_tool, a coaxial stand, Drive Calculator, a Crazyflie on a scale.
+"""Stands by name: thrust_tool, a coaxial stand, a Crazyflie on a scale.
 
 Tables of the thrust_tool stand (J. Majewski), throttle steps with an error per channel, have one row per throttle
 step and headings without units::
@@ -18,17 +18,16 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from bemt.base import units
-from bemt.data.readers import Reader, first_cells, load_text
+from bemt.data.readers import Reader, first_cells
 from bemt.data.readers.headings import Heading, heading, known, slug
 from bemt.data.readers.recording import Builder, slip
 from bemt.data.readers.samples import Channel
-from bemt.data.readers.split import split_table
 from bemt.physics.dataset import Dataset
 
 JMAJEW = "jmajew"
@@ -232,59 +231,6 @@ def _plain(build: Builder, side: str) -> None:
             build.rename(name, "_".join(p for p in parts if p != side))
 
 
-# Tables of Drive Calculator: propellers as power laws of the speed, and motor points.
-#
-# Propellers (``myid,tbs,Name,Dia,Pitch,a,b,...,c,d,...,n10N,n100W,...``): static thrust [gf] = a (n/1000)^b and shaft
-# power [W] = c (n/1000)^d with n in rev/min; Dia and Pitch in inches. The headings name no units, but the table proves
-# those of thrust and power itself: ``n10N`` and ``n100W`` are the speeds at 10 N and 100 W. Rows where they disagree
-# are flagged. The laws are fits of others' measurements at the altitude and temperature beside them, not measurements.
-#
-# Motor points (``id,motor_id,motor,...,U_V,n_rpm,I_A,...``) name most units in their headings.
-
-DRIVECALC = "drivecalc"
-_PROPELLERS = {"Name", "Dia", "Pitch", "a", "b", "c", "d", "n10N", "n100W"}
-_POINTS = {"motor_id", "motor", "kV", "Rm", "U_V", "n_rpm", "I_A", "no_load"}
-_KNOWN = {
-    "Dia": ("diameter", "in"), "Pitch": ("pitch", "in"), "a": ("thrust_law", "gf"), "c": ("power_law", "W"),
-    "AltThr": ("thrust_altitude", "m"), "TmpThr": ("thrust_temperature", "C"), "MaxRPM": ("max", "rpm"),
-    "AltPwr": ("power_altitude", "m"), "TmpPwr": ("power_temperature", "C"), "n10N": ("at_10_N", "rpm"),
-    "n100W": ("at_100_W", "rpm"), "b": ("thrust_exponent", "-"), "d": ("power_exponent", "-"),
-}  # fmt: skip
-
-
-def read_drivecalc(path: str | os.PathLike[str]) -> Dataset:
-    """Read one of the two tables."""
-    build = Builder(split_table(load_text(path), header=True), DRIVECALC, kind="table")
-    propellers = set(build.table.headings) >= _PROPELLERS
-    for k, text in enumerate(build.table.headings):
-        own = known(text, *_KNOWN[text]) if text in _KNOWN else replace(heading(text), unit=None, doubt="", told="")
-        build.add(k, own if propellers else heading(text))
-    if propellers and not build.faults:
-        _check(build, "thrust_law_N", "thrust_exponent", "at_10_N_rpm", 10.0)
-        _check(build, "power_law_W", "power_exponent", "at_100_W_rpm", 100.0)
-        build.warnings.append("power laws fitted to measurements of others (columns srcThr, srcPwr), no measurements")
-    elif not build.faults:
-        build.warnings.append("kV [(rev/min)/V] and Rm [ohm] carry no unit in this table")
-        build.flag_speeds("rpm")
-    return build.finish({"program": "Drive Calculator", "form": "propellers" if propellers else "motor points"})
-
-
-def _check(build: Builder, law: str, exponent: str, at: str, target: float) -> None:
-    """Hold a law against the speed at which the table says that it gives the target."""
-    if not {law, exponent, at} <= build.channels.keys():
-        return
-    a, b, n = (build.channels[name].values for name in (law, exponent, at))
-    with np.errstate(over="ignore", invalid="ignore"):
-        ratio = a * np.clip(n, 0.0, None) ** b / 1000.0**b / target
-    used = np.isfinite(ratio) & (a > 0) & (n > 0)
-    build.flag(np.flatnonzero(used & (np.abs(ratio - 1.0) > 0.02)), f"{law} disagrees with {at}")
-    build.flag(np.flatnonzero(np.isfinite(a) & ~used), f"{law} or {at} is 0: no law")
-    if np.any(used):
-        share = float(np.mean(np.abs(ratio[used] - 1.0) <= 0.02))
-        text = f"{law}: {100 * share:.1f} % of {np.count_nonzero(used)} rows agree with {at} within 2 %"
-        build.warnings.append(text + ("" if share > 0.5 else ": its unit is in doubt"))
-
-
 # Bench tables of a Crazyflie on a scale: total thrust of four propellers, their optical speeds, command and battery.
 #
 # Columns ``pwm`` (0 to 65535), ``vbat[V]``, ``rpm1`` to ``rpm4``, ``weight`` or ``weight[g]`` or ``thrust[g]`` (total,
@@ -347,7 +293,6 @@ class StandTable:
 
 READERS: tuple[Reader | StandTable, ...] = (
     Reader(JMAJEW, sniff_jmajew, read_jmajew),
-    Reader(DRIVECALC, lambda head: first_cells(head) >= _PROPELLERS or first_cells(head) >= _POINTS, read_drivecalc),
     StandTable(
         "coaxial_stand", ({f"{what} {side}" for what in ("PWM", "Thrust", "Speed") for side in ("Left", "Right")},),
         {f"{what} {side.title()}": (f"{name}_{side}".lstrip("_"), unit)

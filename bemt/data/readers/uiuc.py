@@ -40,7 +40,7 @@ from typing import Any
 
 import numpy as np
 
-from bemt.base.errors import Fault, InputError, refuse, system_fault
+from bemt.base.errors import Fault, InputError, system_fault
 from bemt.base.tables import number_of
 from bemt.data.readers import HEAD_BYTES
 from bemt.data.readers.uiuc_names import FAMILIES, VARIABLE_PITCH, UiucFile, UiucName, parse_file_name
@@ -56,12 +56,10 @@ from bemt.data.readers.uiuc_tables import (
     role_of,
     sniff,
 )
-from bemt.physics.dataset import Dataset
 
 __all__ = [
     "KIND", "SOURCE", "UiucFolder", "UiucGeometry", "UiucLine", "UiucPropeller", "UiucStatic", "UiucThickness",
-    "read", "read_folder", "read_geometry", "read_line", "read_static", "read_thickness", "scan_folder", "sniff",
-    "sniff_folder", "to_series",
+    "read", "read_geometry", "read_line", "read_static", "read_thickness", "scan_folder", "sniff", "sniff_folder",
 ]  # fmt: skip
 
 KIND = "uiuc"
@@ -247,21 +245,9 @@ def scan_folder(path: str | os.PathLike[str]) -> UiucFolder:
     return UiucFolder(tuple(propellers), tuple(faults), tuple(ignored))
 
 
-def read_folder(path: str | os.PathLike[str]) -> list[UiucPropeller]:
-    """Import a folder in the archive's layout; refuse it whole when a file of it is faulty."""
-    folder = scan_folder(path)
-    refuse(folder.faults)
-    if not folder.propellers:
-        hint = "File names such as apce_10x5_geom.txt are expected"
-        raise InputError(Fault(os.fspath(path), "", "no propellers", "files in UIUC layout", hint))
-    return list(folder.propellers)
-
-
 def read(path: str | os.PathLike[str]) -> Any:
-    """Read a folder (list of propellers) or one table of the archive, by its header."""
+    """Read one table of the archive, by its header."""
     target = Path(path)
-    if target.is_dir():
-        return read_folder(target)
     try:
         role = role_of(_head(target))
     except OSError as error:
@@ -270,29 +256,3 @@ def read(path: str | os.PathLike[str]) -> Any:
         expected = "one of the headers r/R c/R beta, RPM CT CP, J CT CP eta, r/R t/c"
         raise InputError(Fault(os.fspath(path), "1", "no header of this archive", expected))
     return _READERS[role](target)
-
-
-def to_series(propeller: UiucPropeller) -> Dataset:
-    """All measured points of one propeller as a series of kind ``bench``."""
-    columns: dict[str, list[Any]] = {"rpm": [], "J": [], "CT": [], "CP": [], "eta": []}
-    flags: list[tuple[str, ...]] = []
-    labels: list[str] = []
-    hashes: dict[str, str] = {}
-    runs: list[UiucStatic | UiucLine] = [*propeller.statics, *propeller.lines]
-    for run in runs:
-        zero = np.zeros_like(run.CT)
-        J, eta = (run.J, run.eta) if isinstance(run, UiucLine) else (zero, zero)
-        rows = (zero + run.rpm, J, run.CT, run.CP, eta)
-        for column, array in zip(columns.values(), rows, strict=True):
-            column.append(array)
-        name = Path(run.file).name
-        flags += run.flags
-        labels += [f"{name}:{row}" for row in run.rows]
-        hashes[name] = run.sha256
-    if not hashes:
-        fault = Fault(propeller.folder, propeller.name, "geometry only", "a static or advance-ratio run")
-        raise InputError(fault)
-    values = {name: np.concatenate(arrays) for name, arrays in columns.items()}
-    remark = f"coefficients on the true diameter; nominal {propeller.diameter_in:g} in"
-    provenance = {"source": SOURCE, "file": propeller.folder, "sha256": hashes, "remark": remark}
-    return Dataset("bench", propeller.name, values, {}, tuple(flags), provenance, tuple(labels))

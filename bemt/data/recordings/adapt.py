@@ -1,27 +1,21 @@
-"""What readers of other rooms return, as the record that ``import`` shows; and names for files that hold no results."""
+"""What readers of other rooms return, as the record that ``import`` shows."""
 
 from __future__ import annotations
 
 import math
-import os
-import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import singledispatch
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from bemt.base.averaging import Mean, keep_last, revolution_average
 from bemt.base.errors import Fault, InputError, refuse
-from bemt.base.packed import packed, part_of, unpacked
-from bemt.data.readers import load_bytes, polars_c81, uiuc
 from bemt.data.readers.apc import ApcPerformance
 from bemt.data.readers.references import Reference
 from bemt.data.readers.samples import Channel, dataset
 from bemt.data.readers.slices import Slices
-from bemt.data.recordings.cfd_files import EXPORT
 from bemt.data.recordings.channels import clocks_of, named
 from bemt.data.recordings.check import Finding, check
 from bemt.data.recordings.reduce import reduce
@@ -57,96 +51,6 @@ def reduction_of(record: Dataset) -> Dataset | str:
 
 _KIND = {"apc": "vendor", "uiuc": "bench", "references": "table"}
 _GEOMETRY = ("ApcBlade", "BladeFile", "UiucGeometry", "UiucThickness")
-_EXPORT = f"Fields and meshes hold no loads. {EXPORT}"
-_Mark = tuple[re.Pattern[bytes], str, str]
-_PAGE = ("a web page", "Download the file that it shows, or save its table as CSV")
-_FOAM = ("an OpenFOAM dictionary or field", "Import postProcessing/*/*/*.dat")
-_FLUENT = "file (mesh, fields and settings)"
-
-
-def _begins(mark: bytes, got: str, hint: str) -> _Mark:
-    return re.compile(rb"\A\s*" + re.escape(mark)), got, hint
-
-
-_MARKS: tuple[_Mark, ...] = (
-    (re.compile(rb"\A\s*\Z"), "an empty file", "Did the export finish?"),
-    (re.compile(rb"(?s)\A.{0,1991}<VTKFile "), "a VTK file", _EXPORT),
-    _begins(b"\x89HDF", "HDF5 data (a case, mesh or field file)", _EXPORT),
-    _begins(b"PK\x03\x04", "a damaged zip archive or workbook", "Copy it again, or save the sheet as CSV"),
-    _begins(b"%PDF", "a PDF document", "Copy the numbers into a CSV"),
-    _begins(b"\x89PNG", "a picture", ""),
-    _begins(b"\xff\xd8\xff", "a picture", ""),
-    _begins(b"(rp (", "solver settings of Fluent (no results)", "Settings hold no results; export the report files"),
-    _begins(b"FoamFile", *_FOAM),
-    _begins(b"$MeshFormat", "a mesh", _EXPORT),
-    _begins(b"C Binary", "an EnSight file", _EXPORT),
-    _begins(b"#!TDV", "a Tecplot binary file", _EXPORT),
-    _begins(b"<?xml", "XML", "Export as CSV"),
-    _begins(b"# vtk", "a VTK file", _EXPORT),
-    _begins(b"version https://git-lfs", "a Git LFS pointer instead of the file", "Fetch it: git lfs pull"),
-    _begins(b"{", "JSON, or a program's settings", "Save the numbers as CSV with a line of headings"),
-    _begins(b"<!DOCTYPE", *_PAGE),
-    _begins(b"<html", *_PAGE),
-    (re.compile(rb'(?s)\A(?=.*Grid size).{0,390}\(0 "(?i:fluent)'), f"a Fluent data {_FLUENT}", _EXPORT),
-    (re.compile(rb'(?s)\A.{0,390}\(0 "(?i:fluent)'), f"a Fluent case {_FLUENT}", _EXPORT),
-    (re.compile(rb"(?s)\A.{0,1992}FoamFile"), *_FOAM),
-)
-_IN_TEXT: tuple[_Mark, ...] = (
-    (re.compile(rb"^\s*(#[^\n]*\n\s*)*FORMAT\s+type:\s*ensight", re.IGNORECASE), "an EnSight case file", _EXPORT),
-    (re.compile(rb"APC Propeller .*(Predictions|RPM Range)"), "a summary of APC over many propellers (PER2)",
-     "Import the propeller's own file, PER3_*.dat"),
-    (re.compile(rb"^\s*Force vector: \(", re.MULTILINE), "a force report of Fluent 6 or older",
-     "Copy its table into a CSV with units in the headings"),
-)  # fmt: skip
-
-
-def recognised(path: str | os.PathLike[str]) -> tuple[str, str] | None:
-    """Identify a file that no reader takes: what it is, and a hint; None: the reason of the readers says it."""
-    try:
-        with Path(part_of(path)[0]).open("rb") as stream:
-            head = stream.read(16384)
-        if packed(head):
-            head = unpacked(load_bytes(path), os.fspath(path), 16384)
-    except (OSError, InputError):
-        return None
-    marks = _MARKS if b"\0" in head else (*_MARKS, *_IN_TEXT)
-    if found := next(((got, hint) for mark, got, hint in marks if mark.search(head)), None):
-        return found
-    if b"\0" not in head:
-        return _as_text(head.decode("latin-1"))
-    zeros = max(head[0:400:2].count(0), head[1:400:2].count(0))
-    if zeros > 0.8 * len(head[:400]) / 2 and bytes(16) not in head:
-        return ("what looks like UTF-16 without its mark", "Save the file as UTF-8")
-    return None
-
-
-def _as_text(head: str) -> tuple[str, str] | None:
-    """What a text looks like that is no table of numbers."""
-    lines, words = [line for line in head.splitlines() if line.strip()], head.split()
-    if polars_c81.resembles(head):
-        hint = "Fields are 7 characters wide, nine values after the first; or write alpha_deg, cl, cd, mach as CSV"
-        return ("a C81 table with a different column width", hint)
-    if len(lines) == 1 and re.search(r"[,;\t]", lines[0]):
-        return ("one line and no rows", "Did the logger write any?")
-    if len(lines) > 2 and not any(re.search(r"[\s,;|]", line.strip()) for line in lines):
-        return ("a single column", "One column alone is not enough: also export time, speed or setting")
-    numbers = sum(word.strip("(),;").lstrip("+-").replace(".", "", 1)[:1].isdigit() for word in words)
-    return ("a text without a table of numbers", "") if len(words) > 20 and numbers < 0.2 * len(words) else None
-
-
-_DAMAGED = (
-    (re.compile(rb'^[^"\n,]*"(?:[ \t]+"[^"\n]*")*\)[ \t]*\r?$', re.MULTILINE), "a Fluent report file"),
-    (re.compile(rb'^[^"\n,]*"[ \t]+"[^"\n]*"[ \t]*\r?\n[-+.\d]', re.MULTILINE), "a Fluent monitor"),
-    (re.compile(rb"\(\([-+.\deE ]+\) \([-+.\deE ]+\)"), "an OpenFOAM forces file"),
-    (re.compile(rb"^\(\(xy/key/label", re.MULTILINE), "a Fluent XY plot"),
-)
-
-
-def damaged_export(path: str | os.PathLike[str]) -> str | None:
-    """Say which export a file was, when its body shows it and its head no longer does."""
-    with Path(part_of(path)[0]).open("rb") as stream:
-        head = stream.read(16384)
-    return next((name for mark, name in _DAMAGED if mark.search(head)), None)
 
 
 def _columns(found: Any) -> Iterator[tuple[str, Any]]:
@@ -180,9 +84,8 @@ def adapt(found: Any, form: str, name: str) -> Dataset:
     if isinstance(found, Mapping):
         return _along(found, form, name)
     made = _dataclass(found, form, name) if is_dataclass(found) and not isinstance(found, type) else None
-    if isinstance(found, (list, tuple)) and found:
-        make = next((make for kind, make in _LISTS.items() if all(isinstance(item, kind) for item in found)), None)
-        made = make(list(found), form, name) if make else None
+    if isinstance(found, list) and found and all(isinstance(item, Reference) for item in found):
+        made = _references(found, form, name)
     if made is None:
         raise InputError(Fault(name, "", f"a {type(found).__name__} without numbers", "something that can be shown"))
     return made
@@ -247,19 +150,6 @@ def _along(found: Mapping[str, Slices], form: str, name: str) -> Dataset:
     channels = {k: Channel(np.concatenate([getattr(s, a) for s in found.values()]), k.split("_", 3)[-1] if a != "r"
                            else "m") for k, a in columns.items()}  # fmt: skip
     return dataset(form, "table", channels, notes, {"file": name})
-
-
-def _propellers(found: list[uiuc.UiucPropeller], form: str, name: str) -> Dataset:
-    runs = [uiuc.to_series(item) for item in found if item.statics or item.lines]
-    bare = len(found) - len(runs)
-    notes = [f"{len(found)} propellers"] + ([f"{bare} of them with geometry only"] if bare else [])
-    columns = {key: np.concatenate([run[key] for run in runs]) for key in runs[0].values} if runs else {}
-    if not columns:
-        columns = {"diameter_in": np.array([item.diameter_in for item in found])}
-    return dataset(form, "bench", _channels(columns), notes, {"file": name})
-
-
-_LISTS: Mapping[type, Callable[..., Dataset]] = {Reference: _references, uiuc.UiucPropeller: _propellers}
 
 
 # Averages of one history over whole revolutions, whose duration only the user knows.

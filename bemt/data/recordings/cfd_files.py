@@ -19,17 +19,10 @@ from bemt.physics.dataset import Dataset
 
 PROGRAMS: Mapping[str, str] = {
     "fluent_report": "Fluent", "fluent_monitor": "Fluent", "fluent_forces": "Fluent", "fluent_transcript": "Fluent",
-    "fluent_xy": "Fluent", "fluent_ascii": "Fluent", "cfd_post_csv": "CFD-Post", "design_points": "Workbench",
-    "star_monitor": "STAR-CCM+", "openfoam_forces": "OpenFOAM", "su2_history": "SU2", "flow360_forces": "Flow360",
+    "cfd_post_csv": "CFD-Post", "design_points": "Workbench", "star_monitor": "STAR-CCM+",
+    "openfoam_forces": "OpenFOAM", "su2_history": "SU2", "flow360_forces": "Flow360",
 }  # fmt: skip
 """Program by reader."""
-FIELDS = frozenset({"fluent_xy", "fluent_ascii", "cfd_post_csv"})
-"""Readers whose files may hold values at points, and no loads."""
-EXPORT = (
-    "Write a report file of thrust and torque (Fluent), save the monitors as CSV (STAR-CCM+), or use the function "
-    "object forces (OpenFOAM)"
-)
-"""Where loads come from."""
 SEVERAL = (
     "One condition on several grids: --setup cells=a,b,c, a number for each grid. Other runs: import each with --out, "
     "then give the .toml files together. A restart with its own clock: alone"

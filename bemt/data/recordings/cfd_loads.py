@@ -63,7 +63,6 @@ _VECTOR = {"thrust": "force", "torque": "moment"}
 _TOTAL = re.compile(r"(total[-_ ]?)?(thrust|torque)([-_ ](total|op))*", re.IGNORECASE)
 COEFFICIENTS = ("CT", "CQ", "CP", "J")
 _MEANT = CHANNEL | {"airspeed": "airspeed_m_s", "density": "density_kg_m3"}
-_DISK = re.compile(r"(Disk\d+)_(Force|Moment|Power)(?:_([xyz]))?")  # Flow360: BET and actuator disks
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +77,6 @@ class LoadColumn:
     part: str  # force, moment, or "" where only the heading tells
     unit: str
     record: Dataset
-    of_sound: bool = False  # made dimensionless by the speed of sound and one unit of the grid
 
     @property
     def words(self) -> str:
@@ -109,11 +107,7 @@ def columns_of(file: str, record: Dataset, several: bool) -> list[LoadColumn]:
     clock = {time, *every}
     out = []
     for name in record.values:
-        if name in clock or _ASIDE.match(name) or (form == "flow360_forces" and re.match(r"Disk\d+_Blade", name)):
-            continue
-        if form == "flow360_forces" and (m := _DISK.fullmatch(name)):
-            part, axis = m[2].lower().replace("power", ""), m[3] or ""
-            out.append(LoadColumn(file, name, m[2], m[1], axis, part, "", record, True))
+        if name in clock or _ASIDE.match(name):
             continue
         match = re.fullmatch(r"(.+?)\s*\(([^()]*)\)", name) if form != "openfoam_forces" else None
         if form == "fluent_transcript" and match is None:  # residuals
@@ -205,8 +199,8 @@ class OpenRun:
             got = f"{told}, where the file says {c.unit}"
             self.fault(c, c.name, got, "the unit of the file", f"Leave out --unit {quantity}={told!r}")
             return None
-        if not c.unit and not told and (c.of_sound or (c.part and c.axis) or (c.of_reference and quantity in _VECTOR)):
-            factor = self._of_sound(c) if c.of_sound else self._reference(c, c.part or _VECTOR.get(quantity, ""))
+        if not c.unit and not told and ((c.part and c.axis) or (c.of_reference and quantity in _VECTOR)):
+            factor = self._reference(c, c.part or _VECTOR.get(quantity, ""))
             return None if factor is None else c.record[c.name] * factor
         if unit is None:
             usual = QUANTITIES[quantity][1]
@@ -219,22 +213,6 @@ class OpenRun:
             return None
         scale = unit.factor / (math.pi / 30.0) if quantity == "rpm" else unit.factor
         return np.asarray(c.record[c.name] * (1.0 if unit.suffix == "rpm" else scale))
-
-    def _of_sound(self, c: LoadColumn) -> float | None:
-        """Newtons, newton metres or watts for one of Flow360: rho a^2 L^2, rho a^2 L^3 and rho a^3 L^2.
-
-        Flow360, "BET Loading Output", defBETForce and defBETMoment; the power by the same scales (not checked).
-        """
-        ref = self.run.reference
-        rho, a, unit = ref.density_kg_m3 or self.run.run.density_kg_m3, ref.sound_m_s, ref.length_m
-        if not (rho and a and unit):
-            hint = "--reference density=RHO,sound=A,length=L in kg/m3, m/s and m: L is one unit of the grid"
-            size = {"force": "newtons", "moment": "newton metres"}.get(c.part, "watts")
-            got = f"no {size}: Flow360 divides loads of disks by density, speed of sound and the unit of the grid"
-            self.fault(c, c.name, got, "what it divided by", hint)
-            return None
-        self.rested |= {"density_kg_m3", "sound_m_s", "length_m"}
-        return rho * a**2 * unit**2 * {"force": 1.0, "moment": unit}.get(c.part, a)
 
     def _reference(self, c: LoadColumn, part: str) -> float | None:
         """Newtons, or newton metres, for one of a coefficient; a propeller's own has n D, 2 D^2 and D for reference."""

@@ -316,7 +316,8 @@ class _Measured:
             return Fault("", "--unit", name, f"one of {some(map(repr, self.known), 12)}, or a quantity", meant)
         if name in self.known and (unit := heading(name).unit) and unit.dimension == "none":
             return Fault("", "--unit", f"{name}={text}", "no unit", f"Leave it out: {BY_THE_CASE}")
-        quantity = name if name in CHANNELS else self.taken.get(name) or self._by_unit(name, text)
+        quantity = name if name in CHANNELS else self.taken.get(name)
+        quantity = quantity or next((q for q in (*meanings(name), *_BY_UNIT) if _unit(q, text)), None)
         told = None if quantity is None else _unit(quantity, text)
         if quantity is None or told is None:
             wanted = [d for q in (meanings(name) or [name]) if (d := CHANNELS.get(q))]
@@ -352,10 +353,6 @@ class _Measured:
         if "column" not in facts and len(said) == 1:
             facts = {"column": said[0], "unit": speeds[said[0]].suffix, **facts}
         return {"electrical_rpm": facts}
-
-    def _by_unit(self, name: str, text: str) -> str | None:
-        """Quantity that the words of a heading mean and the unit goes with, else the one that a unit stands for."""
-        return next((q for q in (*meanings(name), *_BY_UNIT) if _unit(q, text)), None)
 
     def complete(self, quantity: str, facts: Facts) -> Iterator[Fault]:
         """Add the column and the unit that the headings tell; faults where they do not."""

@@ -22,7 +22,8 @@ from bemt.data import readers
 from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import RunToml
 from bemt.data.readers.headings import channel_of, heading, meanings
-from bemt.data.recordings.cfd_files import EXPORT, PROGRAMS, Settled, cfd_files, clock_of, read_run, settled, zone_of
+from bemt.data.readers.marks import EXPORT
+from bemt.data.recordings.cfd_files import PROGRAMS, Settled, cfd_files, clock_of, read_run, settled, zone_of
 from bemt.data.recordings.cfd_loads import (
     CHANNEL,
     COEFFICIENTS,

@@ -27,9 +27,8 @@ OPEN_OR_OUT = (*LEFT_OUT, "unnamed_column")
 
 @np.errstate(all="ignore")  # a damaged file may hold any number
 def check(
-    source: Dataset, *, diameter_m: float | None = None, pitch_m: float | None = None, blades: int | None = None,
-    ducted: bool = False,
-) -> tuple[Finding, ...]:  # fmt: skip
+    source: Dataset, *, diameter_m: float | None = None, pitch_m: float | None = None, ducted: bool = False
+) -> tuple[Finding, ...]:
     """Look for faults in a recording.
 
     >>> rpm = [4000.0, 5000.0, 6000.0, 7000.0]
@@ -37,7 +36,7 @@ def check(
     >>> [(f.id, f.correction.split(".")[0]) for f in check(stand, diameter_m=0.254)]
     [('thrust_unit', 'thrust_N: kgf taken for N: multiply by 9')]
     """
-    facts = facts_of(source, diameter_m, pitch_m, blades, ducted)
+    facts = facts_of(source, diameter_m, pitch_m, ducted)
     # what a computation holds constant, somebody has set
     checks = (run for name, run in CHECKS.items() if (source.kind, name) != ("cfd", "constant"))
     found = [finding for run in checks for finding in run(facts)]

@@ -30,7 +30,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.packed import MAX_BYTES
 from bemt.base.tables import file_hash, json_text, number_of
 
-# Archives from elsewhere: fetched whole or resumed, checked before anything is unpacked, put in place in one step.
+# Archives from elsewhere: fetched whole, checked before anything is unpacked, put in place in one step.
 
 MAX_ARCHIVE = 500_000_000
 """Bytes that an archive may have."""
@@ -43,44 +43,24 @@ _BLOCK = 1 << 16
 Progress = Callable[[int, int], None]
 
 
-def _get(url: str, part: Path, progress: Progress | None) -> None:
-    """Fetch into ``part``, going on where an earlier attempt stopped if the server still has the same file."""
+def _get(url: str, target: str, progress: Progress | None) -> None:
+    """Fetch a file, whole and of no more bytes than an archive may have."""
     import requests
 
-    tag_file = part.with_name(part.name + ".tag")
-    have = part.stat().st_size if part.exists() else 0
-    try:
-        tag = json.loads(tag_file.read_text())
-    except (OSError, ValueError):
-        tag = {}
-    headers = {"Accept-Encoding": "identity"}
-    if have and tag.get("url") == url and tag.get("tag"):
-        headers |= {"Range": f"bytes={have}-", "If-Range": tag["tag"]}
-    with requests.get(url, headers=headers, stream=True, timeout=(20, 60)) as answer:
+    with requests.get(url, headers={"Accept-Encoding": "identity"}, stream=True, timeout=(20, 60)) as answer:
         answer.raise_for_status()
-        said = answer.headers
-        go_on = answer.status_code == 206 and said.get("Content-Range", "").startswith(f"bytes {have}-")
-        if answer.status_code == 206 and not go_on:
-            part.unlink(missing_ok=True)
-            raise InputError(Fault(url, "", "a different part than requested", "the rest of the file", "Try again"))
-        have = have if go_on else 0
-        length = said.get("Content-Length", "")
-        total = have + int(length) if length.isdigit() else 0
+        length, have = answer.headers.get("Content-Length", ""), 0
+        total = int(length) if length.isdigit() else 0
         _limit(url, total)
-        # a weak tag does not promise the same bytes
-        strong = said.get("ETag", "") if not said.get("ETag", "W/").startswith("W/") else said.get("Last-Modified", "")
-        tag_file.write_text(json.dumps({"url": url, "tag": strong}))
-        with part.open("ab" if go_on else "wb") as stream:
+        with open(target, "wb") as stream:
             for block in answer.iter_content(_BLOCK):
                 stream.write(block)
                 have += len(block)
                 _limit(url, have)
                 if progress is not None:
                     progress(have, total)
-        if total and have != total:
-            got = f"{have} of {total} bytes"
-            raise InputError(Fault(url, "", got, "the whole file", "Run the command again: it goes on from there"))
-    tag_file.unlink(missing_ok=True)
+    if total and have != total:
+        raise InputError(Fault(url, "", f"{have} of {total} bytes", "the whole file", "Run the command again"))
 
 
 def _limit(url: str, size: int) -> None:
@@ -89,19 +69,16 @@ def _limit(url: str, size: int) -> None:
 
 
 def download(url: str, target: Path, known_sha256: str | None = None, progress: Progress | None = None) -> str:
-    """Fetch a file with pooch; what was fetched before an interruption is kept and completed."""
+    """Fetch a file with pooch, which checks its hash and leaves nothing of one that came in part."""
     import logging
 
     import pooch
     import requests
 
-    part = target.with_name(target.name + ".part")
-    target.parent.mkdir(parents=True, exist_ok=True)
-
     def fetch(url: str, output: str, _: Any) -> None:
-        _get(url, part, progress)
-        os.replace(part, output)
+        _get(url, output, progress)
 
+    target.parent.mkdir(parents=True, exist_ok=True)
     pooch.get_logger().setLevel(logging.WARNING)
     target.unlink(missing_ok=True)
     try:

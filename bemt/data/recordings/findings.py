@@ -61,7 +61,6 @@ class Facts:
     # As far as known [m]
     diameter_m: float | None = None
     pitch_m: float | None = None
-    blades: int | None = None  # Blades
     ducted: bool = False  # Rotor in a duct
     bare: bool = False  # Recorded without a propeller: nothing is expected of its loads
     settled: bool = False  # Rows are means of computed flows: one is enough
@@ -78,10 +77,6 @@ class Facts:
         """Channel with a finite value, else None."""
         v = self.values.get(name)
         return v if v is not None and bool(np.any(np.isfinite(v))) else None
-
-    def first(self, *names: str) -> tuple[str, Array] | None:
-        """First channel of these with a finite value."""
-        return next(((name, v) for name in names if (v := self.get(name)) is not None), None)
 
     def named(self, name: str) -> str:
         """Name in the file."""
@@ -177,18 +172,15 @@ def _without_spikes(rec: Dataset) -> Dataset:
     return replace(rec, values=values)
 
 
-def facts_of(
-    source: Dataset, diameter_m: float | None, pitch_m: float | None, blades: int | None, ducted: bool
-) -> Facts:
+def facts_of(source: Dataset, diameter_m: float | None, pitch_m: float | None, ducted: bool) -> Facts:
     """Gather the facts of a recording or a series."""
     rec = _without_spikes(named(source))
     raw = {k: np.where(far, np.nan, v) if (far := np.abs(v) > 1e12).any() else v for k, v in source.values.items()}
     said, about = source.constants, source.provenance
-    own = int(said["blades"]) if "blades" in said else None
     return Facts(
         rec.values, raw, {k: source.unit(k) for k in raw}, names_of(rec), rec.lines,
         diameter_m if diameter_m is not None else said.get("diameter_m"),
-        pitch_m if pitch_m is not None else said.get("pitch_m"), blades if blades is not None else own,
+        pitch_m if pitch_m is not None else said.get("pitch_m"),
         ducted or about.get("rotor_ducted") == "yes" or about.get("duct") == "yes", about.get("propeller") == "none",
         source.kind == "cfd", asks(source),
     )  # fmt: skip
@@ -207,8 +199,6 @@ _LOG, _FEW_ROWS = 100, 0.2
 
 MOTOR_EFFICIENCY = (0.2, 0.95)
 """Range of a motor's efficiency under load: declared [1]."""
-LEAST_EFFICIENCY = 0.125
-"""Below it power is lost that no motor takes: 86 recordings of shared stands hold 0.15 and more in the median [1]."""
 
 
 def enough(odd: NDArray[np.bool_], among: NDArray[np.bool_]) -> bool:

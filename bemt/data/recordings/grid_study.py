@@ -69,7 +69,6 @@ class GridStudy:
     gci_fine: float | None
     gci_coarse: float | None
     asymptotic: float | None  # GCI32 / (r21^p GCI21), near 1 in the asymptotic range [1]
-    safety: float  # Factor Fs [1]
     u_relative: float  # Standard uncertainty of f1 by the grid, relative [1]
     flags: tuple[str, ...]  # What is wrong with the study; empty when nothing is
 
@@ -137,16 +136,15 @@ class LoadStudy(Documented):
         return f"{lead}; order {self.order:.2f}, {best} at cell size 0, GCI {100 * self.gci_fine:.2f} %, {end}"
 
 
-def ratios(cells: Sequence[float], dimensions: int = 3) -> tuple[float, ...]:
+def ratios(cells: Sequence[float]) -> tuple[float, ...]:
     """Give refinement ratios from cell counts, finest grid first. [1]
 
     >>> [round(r, 3) for r in ratios([8e6, 1e6, 125e3])]
     [2.0, 2.0]
     """
-    if not (min(cells) > 0 and dimensions in (2, 3)):
-        got = f"{', '.join(f'{n:g}' for n in cells)} cells, {dimensions} dimensions"
-        raise InputError(Fault("", "grid", got, "positive numbers and 2 or 3 dimensions"))
-    sizes = [float((1.0 / n) ** (1.0 / dimensions)) for n in cells]
+    if min(cells) <= 0:
+        raise InputError(Fault("", "grid", f"{', '.join(f'{n:g}' for n in cells)} cells", "positive numbers"))
+    sizes = [float((1.0 / n) ** (1.0 / 3.0)) for n in cells]
     return tuple(b / a for a, b in zip(sizes, sizes[1:], strict=False))
 
 
@@ -170,25 +168,8 @@ def _order(e21: float, e32: float, r21: float, r32: float) -> float | None:
     return 0.5 * (low + high)
 
 
-def _asked(f: tuple[float, ...], r: tuple[float, ...], formal_order: float, safety: float | None) -> list[Fault]:
-    """What is wrong with the numbers of a study."""
-    shown, shown_r = (", ".join(f"{v:g}" for v in x) for x in (f, r))
-    several, hint = len(f) in (2, 3), "List the finest grid first; a ratio is coarse over fine cell size"
-    asked: tuple[tuple[bool, str, str, str, str], ...] = (
-        (several, "values", f"{len(f)} grids", "two or three grids, finest first", ""),
-        (not several or len(r) == len(f) - 1, "ratios", f"{len(r)} ratios for {len(f)} grids", f"{len(f) - 1}", ""),
-        (bool(np.all(np.isfinite(f)) and np.all(f[:2])), "values", shown, "finite values other than zero", ""),
-        (all(1.0 < v < math.inf for v in r), "ratios", shown_r, "numbers above 1", hint),
-        (0.0 < formal_order <= 10.0, "formal_order", f"{formal_order:g}", "a number from 0 to 10", ""),
-        (safety is None or 1.0 <= safety < math.inf, "safety", f"{safety or 0:g}", "a factor of 1 or more", ""),
-    )
-    return [Fault("", *told) for right, *told in asked if not right]
-
-
-def grid_study(
-    values: Sequence[float], ratios: Sequence[float], formal_order: float = 2.0, safety: float | None = None
-) -> GridStudy:
-    """Estimate the discretization error of a value.
+def grid_study(values: Sequence[float], ratios: Sequence[float], formal_order: float = 2.0) -> GridStudy:
+    """Estimate the discretization error of a value on two or three grids.
 
     >>> s = grid_study([0.97050, 0.96854, 0.96178], [2, 2])
     >>> f"{s.order:.4f} {s.extrapolated:.5f} {s.gci_fine:.4%} {s.gci_coarse:.4%} {s.asymptotic:.3f}"
@@ -197,9 +178,13 @@ def grid_study(
     0.24
     """
     f, r = tuple(float(v) for v in values), tuple(float(v) for v in ratios)
-    refuse(_asked(f, r, formal_order, safety))
+    if not (np.all(np.isfinite(f)) and np.all(f[:2])):
+        raise InputError(Fault("", "values", ", ".join(f"{v:g}" for v in f), "finite values other than zero"))
+    if not all(1.0 < v < math.inf for v in r):
+        hint = "List the finest grid first; a ratio is coarse over fine cell size"
+        raise InputError(Fault("", "ratios", ", ".join(f"{v:g}" for v in r), "numbers above 1", hint))
     flags = [f"ratio {v:.3g} below {MIN_RATIO}: the index is uncertain" for v in r if v < MIN_RATIO - 1e-9]
-    fs = float(safety or {3: FS_THREE, 2: FS_TWO}[len(f)])
+    fs = {3: FS_THREE, 2: FS_TWO}[len(f)]
     e21, spread = f[1] - f[0], (max(f) - min(f)) / abs(f[0])
     p: float | None = formal_order
     flag, e32 = f"two grids: order {formal_order:g} is assumed", f[-1] - f[-2]
@@ -207,7 +192,7 @@ def grid_study(
         p, flag = _three(e21, e32, r, formal_order)
     flags += [flag] * bool(flag)
     if p is None:
-        return GridStudy(f, r, None, None, None, None, None, fs, 3.0 * spread / COVERAGE, tuple(flags))
+        return GridStudy(f, r, None, None, None, None, None, 3.0 * spread / COVERAGE, tuple(flags))
     factor = r[0] ** p - 1.0
     fine = fs * abs(e21 / f[0]) / factor
     coarse = fs * abs(e32 / f[1]) / (r[1] ** p - 1.0) if len(f) == 3 else None
@@ -218,7 +203,7 @@ def grid_study(
         u = (least + over * max(3.0 * spread - least, 0.0)) / COVERAGE if math.isfinite(spread) else math.inf
     else:
         u = max(fine, 3.0 * spread if flag and len(f) == 3 else 0.0) / COVERAGE
-    return GridStudy(f, r, p, f[0] - e21 / factor, fine, coarse, asymptotic, fs, u, tuple(flags))
+    return GridStudy(f, r, p, f[0] - e21 / factor, fine, coarse, asymptotic, u, tuple(flags))
 
 
 def _three(e21: float, e32: float, r: tuple[float, ...], formal_order: float) -> tuple[float | None, str]:

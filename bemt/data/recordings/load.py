@@ -8,7 +8,6 @@ that the user states.
 from __future__ import annotations
 
 import os
-import re
 import traceback
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -17,11 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from bemt.base.averaging import Mean, relation
+from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError, system_fault
 from bemt.data import readers as importers
 from bemt.data.readers.cfd_run import KIND as RUN
 from bemt.data.readers.cfd_run import RunHead, RunToml
+from bemt.data.readers.marks import EXPORT
 from bemt.data.readers.split import some
 from bemt.data.readers.uiuc_tables import NO_SPEED
 from bemt.data.recordings import cfd_run
@@ -29,13 +29,11 @@ from bemt.data.recordings.adapt import (
     Choice,
     adapt,
     averaged,
-    damaged_export,
     findings,
     is_recording,
-    recognised,
     reduction_of,
 )
-from bemt.data.recordings.cfd_files import EXPORT, FIELDS, PROGRAMS, cfd_files, clock_of
+from bemt.data.recordings.cfd_files import PROGRAMS, cfd_files
 from bemt.data.recordings.cfd_loads import other_than_loads
 from bemt.data.recordings.grid_study import merged, of_table
 from bemt.data.recordings.reduce import reduction
@@ -47,7 +45,6 @@ __all__ = ["Choice", "as_dataset", "averaged", "import_file", "import_files"]
 
 SETTLED = 0.01
 """Drift above which a mean is called unsettled."""
-_RESTART = re.compile(r"(.+?)((?:_\d+)+)(\.[^.]*)?(?:\.gz)?")
 
 
 def import_file(path: str | os.PathLike[str], format: str | None = None, choice: Choice | None = None) -> Dataset:  # noqa: A002
@@ -58,7 +55,7 @@ def import_file(path: str | os.PathLike[str], format: str | None = None, choice:
         raise InputError(Fault(name, "", "a folder with a case", "a recording", "`bemt sweep` solves cases"))
     if format is None and Path(path).is_dir() and (inside := _run_in(Path(path))) is not None:
         return inside if isinstance(inside, Dataset) else cfd_run.assemble(inside, Path(), name)
-    kind = _kind(path, name) if format is None else format
+    kind = importers.detect(path) if format is None else format
     try:
         found = importers.read(path, kind)
     except InputError as error:  # the columns of a UIUC line under a name of one's own: a table without a speed
@@ -87,28 +84,10 @@ def _finished(record: Dataset, choice: Choice) -> Dataset:
     return replace(record, notes=(*record.notes, *_unsettled(record)))
 
 
-def _kind(path: str | os.PathLike[str], name: str) -> str:
-    """Reader of a file; refused with what it looks like where that is no table, or a damaged export."""
-    try:
-        kind = importers.detect(path)
-    except InputError as error:
-        told = recognised(path)
-        if told is None:
-            raise
-        raise InputError(Fault(name, "", told[0], "results as a table of text", told[1])) from error
-    damaged = damaged_export(path) if getattr(importers.importers()[kind], "FALLBACK", False) else ""
-    if damaged:
-        hint = "Its head is cut or altered; export it again, or give --format"
-        raise InputError(Fault(name, "", f"what looks like {damaged}", "a whole file", hint))
-    return kind
-
-
 def _run_in(folder: Path) -> Dataset | RunToml | None:
-    """CFD run of a folder: its run.toml, else all exports in it; None where a reader takes the folder."""
+    """CFD run of a folder: its run.toml, else all exports in it; None where it has neither."""
     if (folder / "run.toml").is_file():
         return import_file(folder / "run.toml")
-    if any(hasattr(m, "sniff_folder") and m.sniff_folder(folder) for m in importers.importers().values()):
-        return None
     files = cfd_files(folder)
     return RunToml.model_validate({"run": {"files": tuple(map(str, files))}}) if files else None
 
@@ -135,36 +114,6 @@ def _unsettled(record: Dataset) -> list[str]:
     return [f"not settled (drift over the averaged part): {', '.join(moving[:6])}{more}"] if moving else []
 
 
-def _restart_notes(paths: Sequence[str], records: Mapping[str, Dataset]) -> dict[str, list[str]]:
-    """Say of every restart file what it belongs to, and that it was not joined."""
-    notes: dict[str, list[str]] = {}
-    for path in paths:
-        record = records.get(path)
-        if record is None or record.clock not in ("time", "iteration"):
-            continue
-        for other in _earlier(Path(path), paths, records):
-            text = f"next to {other}: not joined"
-            if other in records:
-                how = relation(clock_of(records[other]), clock_of(record))
-                text = f"restart of {other} ({how}): not joined"
-                if how == "other clock":
-                    text += "; the same steps mean other times"
-            notes.setdefault(path, []).append(text)
-    return notes
-
-
-def _earlier(path: Path, paths: Sequence[str], records: Mapping[str, Dataset]) -> list[str]:
-    match = _RESTART.fullmatch(path.name)
-    if match and records[str(path)].format == "fluent_report":
-        base = path.with_name(match[1] + (match[3] or ""))
-        known = [p for p in paths if Path(p) == base]
-        return known or ([str(base)] if base.is_file() else [])
-    start = importers.number(path.parent.name) if records[str(path)].format == "openfoam_forces" else None
-    parts = {p: importers.number(Path(p).parent.name) for p in paths if p in records and Path(p).name == path.name
-             and Path(p).parent.parent == path.parent.parent}  # fmt: skip
-    return [p for p, at in parts.items() if start is not None and at is not None and at < start]
-
-
 def import_files(
     paths: Iterable[str | os.PathLike[str]], format: str | None = None, choice: Choice | None = None,  # noqa: A002
     run: RunToml | None = None, insist: bool = False, stated: Mapping[str, Dataset] = {},  # noqa: B006
@@ -188,8 +137,7 @@ def import_files(
         to_do = None
     told = {d.file for d in runs}
     runs = [*runs, *(d for d in records.values() if cfd_run.is_run(d) and d.file not in told)]
-    notes = _restart_notes(names, records)
-    files = [_file(name, format, records.get(name), notes.get(name, []), errors.get(name)) for name in names]
+    files = [_file(name, format, records.get(name), errors.get(name)) for name in names]
     return Imported(tuple(files), tuple(d for d in runs if cfd_run.is_run(d)), to_do)
 
 
@@ -294,8 +242,7 @@ def runs_of(
         if not isinstance(error, InputError):
             # what a file refuses to hold its own entry says; where we fail to join files, nothing else does
             return runs, None if isinstance(error, (ValueError, OSError)) else _refusal(error)
-        fields = {importers.detect(e) for e in exports} <= FIELDS  # values at points are no run
-        return runs, None if fields and any(f.expected == cfd_run.NO_LOAD for f in error.faults) else str(error)
+        return runs, str(error)
 
 
 def _refusal(error: Exception) -> str:
@@ -310,14 +257,14 @@ def _refusal(error: Exception) -> str:
 
 
 def _file(
-    name: str, format: str | None, record: Dataset | None, notes: Sequence[str], error: str | None  # noqa: A002
+    name: str, format: str | None, record: Dataset | None, error: str | None  # noqa: A002
 ) -> ImportedFile:  # fmt: skip
     if record is None:
-        return ImportedFile(name, format, warnings=tuple(notes), error=error)
+        return ImportedFile(name, format, error=error)
     try:
         reduced = _reduced(record)
         found = ImportedFile(name, record.format, record, reduced, _means(record, reduced),
-                             findings(record), (*record.notes, *notes), error)  # fmt: skip
+                             findings(record), record.notes, error)  # fmt: skip
         found.document()  # what cannot be shown is refused with its file
     except Exception as failed:
         return ImportedFile(name, format, error=_refusal(failed))

@@ -279,7 +279,8 @@ def find_slips(facts: Facts) -> Iterator[Finding]:
             fix += f". If it is power of the shaft: {_told(fits[0][1].quantity, facts)}: {fits[0][1].words}"
         yield Finding("power_electrical", facts.named("power_W"), text, fix, (), "warning")
         return
-    evidence = "; ".join(f"{r.name} is {r.value:.4g}, must be {_bounds(r)}" for r in broken[:4])
+    must = [f"{r.centre:g}" if r.exact else f"{r.low:g} to {r.high:g}" for r in broken[:4]]
+    evidence = "; ".join(f"{r.name} is {r.value:.4g}, must be {m}" for r, m in zip(broken, must, strict=False))
     certain = any(r.exact for r in broken)
     if not fits:
         channels = sorted({_told(q, facts) for r in broken for q in r.powers if q in _QUANTITY or q == "D"})
@@ -329,10 +330,6 @@ def _listed(others: list[Slip], facts: Facts) -> list[str]:
         span = f"{poles[0]}" if len(poles) == 1 else f"{poles[0]} to {poles[-1]}"
         out.insert(0, f"{_told('n', facts)}: electrical revolutions over {span} pole pairs")
     return out
-
-
-def _bounds(r: Relation) -> str:
-    return f"{r.centre:g}" if r.exact else f"{r.low:g} to {r.high:g}"
 
 
 # A recording in other units than its companions, found by its level: readings over what the same model gives.

@@ -90,7 +90,7 @@ def load(
     _airspeed_in_doubt(imported, case, path)
     _same_rotor(imported, case, path)
     ducted = case.ducted
-    findings = check(imported, diameter_m=case.diameter_m, blades=int(case.get("rotor.blades")), ducted=ducted)
+    findings = check(imported, diameter_m=case.diameter_m, ducted=ducted)
     found = tuple(f"{Path(path).name}: {f}" for f in findings if f.severity != "note")
     imported = left_out(imported, findings)
     rows = named(imported)

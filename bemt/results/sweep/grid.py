@@ -2,7 +2,7 @@
 
 Rows run over the axes in the order geometry (pitch, diameter, gap), air, rpm, airspeed, angle, the last one fastest.
 The grid is cut into chunks whose edges depend on the axes alone, and a chunk depends on nothing but its number; each
-finished chunk is a file, so an interrupted run goes on where it stopped and gives the same bytes, whoever solves them.
+finished chunk is a file, so an interrupted run goes on where it stopped and gives the same bytes.
 """
 
 from __future__ import annotations
@@ -11,8 +11,7 @@ import hashlib
 import json
 import math
 import shutil
-from collections.abc import Callable, Generator, Mapping, Sequence
-from contextlib import closing
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -148,11 +147,6 @@ class Grid:
         return -(-self.size // self.chunk)
 
 
-Solved = tuple[int, bytes, Statistics]
-Engine = Callable[[Case, Grid, Sequence[int], bool], Generator[Solved]]
-"""Solves chunks: (case, grid, numbers, whether rows are wanted) to (number, bytes, statistics) in whatever order."""
-
-
 class GridSolver:
     """Evaluates stretches of a grid, rows or statistics only; remembers the last geometry and states of the air."""
 
@@ -163,11 +157,6 @@ class GridSolver:
         self._last: tuple[int, Any] = (-1, None)
         self._air_names = [name for name in grid.names if name in AIR]
         self._airs: dict[int, Air] = {}
-
-    def _ready(self, geometry: int, overrides: Mapping[str, float]) -> Any:
-        if self._last[0] != geometry:
-            self._last = (geometry, prepared(self.case.replaced(overrides)))
-        return self._last[1]
 
     def _state(self, flat: int) -> Air:
         """State of the air at a position on the axes of the air."""
@@ -195,7 +184,9 @@ class GridSolver:
         distinct, here = np.unique(which, return_inverse=True)
         states = [self._state(flat) for flat in distinct.tolist()]
         air = states[0] if not self._air_names else air_arrays(states, here)
-        found = solve_at(self._ready(geometry, overrides), flow[0], flow[1], flow[2], air, self.threads)
+        if self._last[0] != geometry:
+            self._last = (geometry, prepared(self.case.replaced(overrides)))
+        found = solve_at(self._last[1], flow[0], flow[1], flow[2], air, self.threads)
         if _turned(self.case) and not np.any(flow[2]):  # axial points of an oblique grid
             return replace(found, values={**found.values, "H_force_N": np.where(found.converged, 0.0, np.nan)})
         return found
@@ -229,18 +220,6 @@ def solve_chunk(solver: GridSolver, number: int) -> tuple[bytes, Statistics]:
     return encode(block) if solver.rows else b"", told
 
 
-def _here(threads: int) -> Engine:
-    """Engine in this process."""
-
-    def solve(case: Case, grid: Grid, numbers: Sequence[int], rows: bool) -> Generator[Solved]:
-        solver = GridSolver(case, grid, threads, rows) if numbers else None
-        for number in numbers:
-            assert solver is not None
-            yield number, *solve_chunk(solver, number)
-
-    return solve
-
-
 def _merge(statistics: list[Statistics]) -> Statistics:
     ends = []
     for name in STATISTICS:
@@ -251,7 +230,7 @@ def _merge(statistics: list[Statistics]) -> Statistics:
 
 def run_grid(
     case: Case, folder: Path | None, fingerprint: str, threads: int = 1,
-    progress: Callable[[int, int], None] | None = None, resume: bool = True, engine: Engine | None = None,
+    progress: Callable[[int, int], None] | None = None, resume: bool = True,
 ) -> GridResult | None:  # fmt: skip
     """Solve the grid of a case."""
     grid = Grid.of(case)
@@ -279,15 +258,16 @@ def run_grid(
             if found is not None:
                 count(number, found)
     todo = [number for number in range(grid.chunks) if number not in statistics]
-    with closing((engine or _here(threads))(case, grid, todo, parts is not None)) as solved:
-        for number, data, made in solved:
-            if parts is not None:
-                path = _part(parts, number)
-                write_atomic(path, data)
-                told = plain(made.document())
-                record = {"statistics": told, "sha256": _seal(data, told)}
-                write_atomic(path.with_suffix(".json"), json.dumps(record))
-            count(number, made)
+    solver = GridSolver(case, grid, threads, parts is not None)
+    for number in todo:
+        data, made = solve_chunk(solver, number)
+        if parts is not None:
+            path = _part(parts, number)
+            write_atomic(path, data)
+            told = plain(made.document())
+            record = {"statistics": told, "sha256": _seal(data, told)}
+            write_atomic(path.with_suffix(".json"), json.dumps(record))
+        count(number, made)
     digest = None
     names = (*grid.names, *_columns(case), "converged")
     if folder is not None and parts is not None:
