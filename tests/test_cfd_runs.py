@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bemt import diagnose
 from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.data.readers.cfd_run import RunToml, toml_text
@@ -768,10 +769,12 @@ FAN = {"rotor_blades": (45.6, -1.15), "spinner": (-1.05, -0.001), "stator_vanes"
 """Force and moment of each zone of a ducted fan with vanes [N], [N m]."""
 
 
-def zones_report(put: Callable[..., Path], zones: dict[str, tuple[float, float]]) -> list[str]:
+def zones_report(
+    put: Callable[..., Path], zones: dict[str, tuple[float, float]], axis: str = "0 0 1", no_force: str = ""
+) -> list[str]:
     for k, (name, kind, unit) in enumerate((("forces", "Forces", "N"), ("moments", "Moments", "N m"))):
-        way = "Direction Vector (0 0 1)" if k == 0 else "Moment Center (0 0 0) Moment Axis (0 0 1)"
-        rows = [(z, v[k]) for z, v in zones.items()]
+        way = "Direction Vector (0 0 1)" if k == 0 else f"Moment Center (0 0 0) Moment Axis ({axis})"
+        rows = [(z, v[k]) for z, v in zones.items() if k or z != no_force]
         body = "".join(f"{z:16} {0.9 * v:.6g}  {0.1 * v:.6g}  {v:.6g}\n" for z, v in rows)
         net = sum(v for _, v in rows)
         put(f"{name}.txt", f"{kind} - {way}\n          {kind} [{unit}]\nZone      Pressure   Viscous   Total\n{body}"
@@ -789,6 +792,57 @@ def test_the_torque_is_that_of_what_turns_and_the_thrust_that_of_all(
     assert run["thrust_N"][0] == pytest.approx(sum(T for T, _ in FAN.values()))
     assert run["duct_thrust_N"][0] == pytest.approx(26.8)
     assert any(names.get("stator_vanes", "stator_vanes") in n for n in run.notes if "torque" in n)
+
+
+def test_forces_and_moments_are_of_one_shaft_and_of_the_same_zones(put: Callable[..., Path]) -> None:
+    blades = {"blade_1": (3.2, 0.064), "blade_2": (3.2, 0.064), "hub": (-0.1, 0.0003)}
+    with pytest.raises(InputError, match=r"about \(1 0 0\), where the force is along \(0 0 1\)"):
+        run_of(zones_report(put, blades, "1 0 0"), {"rpm": 6000.0})
+    with pytest.raises(InputError, match="a moment of blade_2 and no force of it"):
+        run_of(zones_report(put, blades, no_force="blade_2"), {"rpm": 6000.0})
+    run = run_of(zones_report(put, blades, "0 0 -2"), {"rpm": 6000.0})
+    assert run["thrust_N"][0] == pytest.approx(6.3) and run["torque_Nm"][0] == pytest.approx(0.1283)
+
+
+@pytest.mark.parametrize(
+    ("told", "expected"),
+    [
+        (["--column", "thrust=Thrust"], "a column of mass for the thrust"),
+        (["--column", "torque=Thrust"], "a column of mass for the torque"),
+        (["--unit", "Thrust=kg"], "write kgf"),
+        (["--unit", "Thrust=m/s"], "a unit of force"),
+        (["--unit", "Thrust=kgf"], ""),
+        (["--unit", "thrust=kgf"], ""),
+    ],
+)
+def test_a_unit_that_no_thrust_has_is_asked_for_and_what_is_stated_then_counts(
+    put: Callable[..., Path], capsys: pytest.CaptureFixture[str], told: list[str], expected: str
+) -> None:
+    rows = "".join(f"{k},{T},{Q}\n" for k in range(1, 99))
+    put("run.csv", f'"Iteration","Thrust Monitor: Thrust (kg)","Torque Monitor: Torque (N-m)"\n{rows}')
+    assert main(["import", "run.csv", "--rpm", "8000", *told, "--out", "run.toml"]) == (2 if expected else 0)
+    assert expected in capsys.readouterr().err
+    if not expected:
+        assert load_run("run.toml")["thrust_N"][0] == pytest.approx(9.80665 * T)
+
+
+def test_one_revolution_has_no_drift(put: Callable[..., Path]) -> None:
+    """Of a start that is still going on nothing says so but the revolutions before."""
+    t = np.linspace(0.0, 1.1 * 60.0 / RPM, 400)
+    rows = "".join(f"{at:.8g},{T * (1.0 - np.exp(-at / t[-1])):.8g},{Q}\n" for at in t)
+    put("run.csv", f'"Physical Time (s)","Thrust Monitor: Thrust (N)","Torque Monitor: Torque (N-m)"\n{rows}')
+    run = run_of(["run.csv"], {"rpm": RPM})
+    assert "thrust_N" not in run.drift and "nothing says that it has settled" in run.averaged["thrust_N"]
+
+
+def test_rows_that_differ_in_what_nobody_read_are_no_repeats(tmp_path: Path, project: Path) -> None:
+    rows = "".join(f"DP {k},6000,{5 * k},{5 - k},0.1\n" for k in range(4))
+    (tmp_path / "a.csv").write_text(f"Design Points,rpm [rpm],P7 [m s^-1],thrust [N],torque [N m]\n{rows}")
+    case = str(project / "cases" / "prop_8x5")
+    with pytest.raises(InputError, match="P7: got rows that differ in nothing else"):
+        diagnose(str(tmp_path / "a.csv"), case)
+    (tmp_path / "a.csv").write_text((tmp_path / "a.csv").read_text().replace("P7", "velocity_inlet"))
+    assert run_of([str(tmp_path / "a.csv")], {})["airspeed_m_s"].max() == 15.0
 
 
 def test_zones_of_which_nothing_tells_what_turns_are_asked_for(put: Callable[..., Path]) -> None:

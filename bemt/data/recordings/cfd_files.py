@@ -174,7 +174,10 @@ def settled(
         scatter = float(np.std(turns, ddof=1) / math.sqrt(turns.size)) if turns.size > 1 else 0.0
         wide = (np.ptp(turns) / abs(found.mean) if turns.size and found.mean else 0.0) > SCATTERED
         over = found.span + ("; revolutions differ by more than 2 %" if wide else "")
-        return Settled(np.array([found.mean]), (found.drift or 0.0) * abs(found.mean), scatter, over)
+        if found.drift is None:
+            over += ", with none before it: nothing says that it has settled"
+        drift = math.nan if found.drift is None else found.drift * abs(found.mean)
+        return Settled(np.array([found.mean]), drift, scatter, over)
     if clock == "iteration":
         found = steady_average(values)
         if found.mean is None:

@@ -37,6 +37,7 @@ _SLIGHT = 0.01
 NET = ("net", "total", "")
 _FORCE = re.compile(r"force_total(?:_([xyz]))?(?:_N)?( along .*)?|C(?:F)([xyz])")
 _MOMENT = re.compile(r"moment_total(?:_([xyz]))?(?:_Nm)?( along .*)?|C(?:M)([xyz])")
+_ALONG_VECTOR, _PARALLEL = re.compile(r"along \(([^()]*)\)"), 0.1  # sine of the angle between two axes
 _ASIDE = re.compile(
     r"(force|moment)_(pressure|viscous|porous|internal)(_|\b)|center_of_pressure|(force|moment)_coefficient"
 )
@@ -46,7 +47,7 @@ _WORDS: dict[str, str] = {
     "torque": r"torque|moment|^m[xyz]?$|couple|drehmoment|par[_ ]motor",
     "power": r"power|leistung",
     "duct_thrust": r"duct|shroud|nozzle",
-    "airspeed": r"inlet[-_ ]?(velocity|speed)|advance[-_ ](speed|velocity)|flight[-_ ]speed",
+    "airspeed": r"inlet[-_ ]?(velocity|speed)|(velocity|speed|\bv)[-_ ]?inlet|advance[-_ ](speed|velocity)|flight[-_ ]speed",
     "cells": CELLS.pattern,
 }
 """Headings of a quantity in CFD beside those that benches have as well (`usual`)."""
@@ -144,6 +145,8 @@ class OpenRun:
     size_unit: str = ""  # of a column of cell sizes, SI; "" if not known
     zones: frozenset[str] = frozenset()  # whose forces are the thrust
     elsewhere: list[Elsewhere] = field(default_factory=list)
+    unread: str = ""  # columns in which alone some rows differ
+    pools: dict[str, dict[str, LoadColumn]] = field(default_factory=dict)  # columns of each load by zone
 
     def fault(self, at: LoadColumn | None, where: str, got: str, expected: str, hint: str = "") -> None:
         """Note a fault of a column's file, or of the run."""
@@ -176,15 +179,22 @@ class OpenRun:
                 self.fault(None, f"columns.{quantity}.column", repr(told), f"one of {known}")
             dimension = QUANTITIES[quantity][0]
             for c in hits[:1]:
-                other = "" if unit_of(c.unit) else c.coefficient[0] or other_dimension(c.stem, dimension)
-                if other:
+                unit = unit_of(c.unit)
+                other = c.coefficient[0] or other_dimension(c.stem, dimension)
+                if unit is not None:  # what is stated of its unit is kept, in `si`
+                    other = "" if unit.dimension == dimension or self.fact(quantity).unit else unit.dimension
+                if other and quantity != "cells":
                     got = f"a column of {other.replace('_', ' ')} for the {quantity}"
                     hint = f"Leave out its unit: {BY_THE_CASE}" if c.coefficient[0] else ""
+                    if unit is not None:
+                        meant = f"{c.unit}f" if (other, dimension) == ("mass", "force") else QUANTITIES[quantity][1]
+                        hint = f"The file says {c.unit}; if that is wrong: --unit {quantity}={shlex.quote(meant)}"
                     self.fault(c, c.name, got, f"one of {dimension.replace('_', ' ')}", hint)
             return hits
         taken = {getattr(self.run.columns, q).column for q in QUANTITIES if getattr(self.run.columns, q) is not None}
         return _recorded(
-            [c for c in self.columns if not (c.name in taken or c.stem in taken or c.axis) and _fits(c, quantity)]
+            [c for c in self.columns if not (c.name in taken or c.stem in taken or c.axis)
+             and _fits(c, quantity, self.fact(quantity).unit)]  # fmt: skip
         )
 
     def si(self, quantity: str, c: LoadColumn) -> Array | None:
@@ -195,7 +205,8 @@ class OpenRun:
         told = self.fact(quantity).unit
         unit = unit_of(told) if told else unit_of(c.unit)
         stated = unit_of(c.unit)
-        if told and stated is not None and unit is not None and stated.suffix != unit.suffix:
+        alike = stated is not None and unit is not None and stated.dimension == unit.dimension
+        if told and alike and stated.suffix != unit.suffix:  # type: ignore[union-attr]
             got = f"{told}, where the file says {c.unit}"
             self.fault(c, c.name, got, "the unit of the file", f"Leave out --unit {quantity}={told!r}")
             return None
@@ -347,9 +358,11 @@ def other_than_loads(names: Iterable[str]) -> str:
     return next((what for what, pattern in _OTHER.items() if any(map(pattern.search, own))), "")
 
 
-def _fits(c: LoadColumn, quantity: str) -> bool:
-    """Whether a column may be a quantity, by its unit and by the words of its heading."""
-    unit = unit_of(c.unit)
+def _fits(c: LoadColumn, quantity: str, told: str | None = None) -> bool:
+    """Whether a column may be a quantity, by its unit, or what is ``told`` of it, and by the words of its heading."""
+    unit, stated = unit_of(c.unit), unit_of(told or "")
+    if stated is not None and unit is not None and unit.dimension == "mass":  # kg for kgf
+        unit = stated
     if (unit is None and _NOT.search(c.stem)) or (unit is not None and unit.dimension != QUANTITIES[quantity][0]):
         return False
     word = c.words
@@ -417,6 +430,25 @@ def by_zone(run: OpenRun, quantity: str) -> dict[str, LoadColumn]:
             run.fault(c, quantity, got, "one column", option)
         out.setdefault(label, c)
     return out
+
+
+def one_rotor(run: OpenRun) -> None:
+    """Refuse forces and moments that are not of one shaft, or not of the same zones."""
+    forces, moments = run.pools.get("thrust", {}), run.pools.get("torque", {})
+    if not forces or not moments:
+        return
+    first = [next(iter(pool.values())) for pool in (forces, moments)]
+    told = [_ALONG_VECTOR.search(c.name) for c in first]
+    if all(told):
+        a, b = (np.array([float(x) for x in t[1].split()]) for t in told if t)
+        if np.linalg.norm(np.cross(a, b)) > _PARALLEL * np.linalg.norm(a) * np.linalg.norm(b):
+            got = f"the moment about ({told[1][1]}), where the force is along ({told[0][1]})"  # type: ignore[index]
+            hint = f"Report it about that axis, or leave it out: --ignore {shlex.quote(first[1].stem)}"
+            run.fault(first[1], first[1].name, got, "both along the shaft", hint)
+    alone = [z for z in moments if z not in forces and z.lower() not in NET]
+    if alone and run.run.run.zones is None and any(z in forces for z in moments if z.lower() not in NET):
+        got, hint = f"a moment of {', '.join(alone)} and no force of it", "Export the force of every zone"
+        run.fault(first[0], "zones", got, "forces and moments of the same zones", f"{hint}; --zones: those that count")
 
 
 def other_axes(run: OpenRun, c: LoadColumn) -> list[LoadColumn]:

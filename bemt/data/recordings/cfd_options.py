@@ -139,7 +139,7 @@ def run_from(
     several: dict[str, list[str]] = {}
     for name, text in united.items():
         if name not in QUANTITIES:
-            several.setdefault(str(_quantity(name, text)), []).append(name)
+            several.setdefault(str(_quantity(_in_case(name, QUANTITIES), text)), []).append(name)
     for quantity, names in several.items():
         if len(names) == 1:
             columns[quantity]["column"] = names[0]

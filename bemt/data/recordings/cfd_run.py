@@ -34,6 +34,7 @@ from bemt.data.recordings.cfd_loads import (
     by_zone,
     columns_of,
     counted_zones,
+    one_rotor,
     other_axes,
     other_than_loads,
 )
@@ -53,6 +54,8 @@ from bemt.physics.dataset import Dataset
 __all__ = ["NO_LOAD", "assemble", "is_run", "run_at", "run_text"]
 
 NO_LOAD = "a thrust or a torque"
+WHICH = "--column airspeed=NAME says what it is, --ignore NAME leaves it out"
+"""What to do with a column that nothing read."""
 MOVING = 0.01
 """Drift over the averaged part above which a load has not settled. [1]"""
 LOST = 0.5
@@ -139,6 +142,7 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> CfdRun:
         _ask_all(work)
         raise InputError(work.told)
     loads = {name: load for q in ("thrust", "torque", "power") for name, load in _summed(work, q).items()}
+    one_rotor(work)
     for column in work.named("duct_thrust")[:1] if run.columns.duct_thrust is not None else []:
         if (own := work.mean("duct_thrust", column)) is not None:
             loads["duct_thrust"] = own
@@ -166,7 +170,7 @@ def _opened(run: RunToml, folder: Path, name: str) -> tuple[OpenRun, list[tuple[
 
 def _summed(work: OpenRun, quantity: str) -> dict[str, Settled]:
     """A load summed over the zones that count, and the duct's part of a thrust; {} where it is not whole."""
-    pool = by_zone(work, quantity)
+    pool = work.pools[quantity] = by_zone(work, quantity)
     counted, ducts = counted_zones(work, quantity, pool) if pool else ([], [])
     if not counted:
         return {}
@@ -356,8 +360,8 @@ def _unused(work: OpenRun, values: Mapping[str, Array]) -> None:
     stated = state and not _GRIDS & state.keys()
     apart = any(len(g) > 1 for g in groups(Dataset("cfd", "", state))) if stated else not state
     end = f": {len(rest[0].record)} rows, of which some differ in nothing else, are no repeats" if apart else ""
-    hint = "--column airspeed=NAME says what it is, --ignore NAME leaves it out"
-    work.notes.insert(0, f"not used, though the rows differ in it: {names}{end}; {hint}")
+    work.unread = names if apart else ""
+    work.notes.insert(0, f"not used, though the rows differ in it: {names}{end}; {WHICH}")
 
 
 def _coefficients(work: OpenRun, points: _Points) -> None:
@@ -416,7 +420,7 @@ def _dataset(work: OpenRun, points: _Points, read: Sequence[tuple[str, Dataset]]
     made = CfdRun("cfd", Path(name).name, full, {k: np.broadcast_to(v, (rows,)) for k, v in points.u.items()}, (),
                   about, labels, notes=tuple(dict.fromkeys(work.notes)), files=tuple(work.run.run.files),
                   conditions=conditions, averaged=averaged, drift=drift, units_given=given, zones=work.zones,
-                  elsewhere=tuple(work.elsewhere))  # fmt: skip
+                  elsewhere=tuple(work.elsewhere), unread=work.unread)  # fmt: skip
     keep = np.any([np.isfinite(v) for k, v in full.items() if k not in _POINT], axis=0)
     if not keep.all():
         note = f"{number_of((~keep).sum(), 'point')} without a load left out"

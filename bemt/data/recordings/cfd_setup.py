@@ -134,6 +134,7 @@ class CfdRun(Dataset):
     studies: tuple[LoadStudy, ...] = ()
     zones: frozenset[str] = frozenset()
     elsewhere: tuple[Elsewhere, ...] = ()
+    unread: str = ""  # Columns that nothing read, and in which alone some of its rows differ
 
     def document(self) -> dict[str, Any]:
         """Plain values."""

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.units import KNOT, MPH, RPM, ZERO_CELSIUS, split_suffix
 from bemt.data.readers.headings import counts_electrical, may_be_shaft_speed, surely_shaft_speed
+from bemt.data.recordings.cfd_run import WHICH, is_run
 from bemt.data.recordings.channels import MEASURED, asks, in_one_step, moves, named, names_of
 from bemt.data.recordings.findings import zero_thrust_speed
 from bemt.data.recordings.shown import options_of
@@ -226,6 +227,10 @@ def with_headings(imported: Dataset, name: str) -> None:
 
 def speed_in_doubt(imported: Dataset, path: str) -> None:
     """Refuse a file whose speed, or airspeed, cannot be read: it must not be left out, nor be that of a case."""
+    if is_run(imported) and imported.unread:
+        hint = f"{WHICH[0].upper()}{WHICH[1:]}"
+        got, expected = "rows that differ in nothing else that was read", "the meaning of what they differ in"
+        raise InputError(Fault(path, imported.unread, got, expected, hint))
     told = named(imported).values
     if (doubt := asks(imported).get("airspeed")) and "J" not in told:
         name, got, fix = doubt

@@ -81,6 +81,7 @@ def load(
         _one_setup(imported, path)
         one_rotor(imported, path, "`compare A B --rows-b rotor={} --case CASE` takes one of them")
     if is_run(imported):
+        speed_in_doubt(imported, path)
         run, gains = one_grid(imported)
         made = records.from_series(run, case, gains)
         return replace(made, notes=(*made.notes, *imported.notes), computed=True, setup=setup, whole=imported)
