@@ -47,7 +47,7 @@ _WORDS: dict[str, str] = {
     "torque": r"torque|moment|^m[xyz]?$|couple|drehmoment|par[_ ]motor",
     "power": r"power|leistung",
     "duct_thrust": r"duct|shroud|nozzle",
-    "airspeed": r"inlet[-_ ]?(velocity|speed)|(velocity|speed|\bv)[-_ ]?inlet|advance[-_ ](speed|velocity)|flight[-_ ]speed",
+    "airspeed": r"inlet[-_ ]?(velocity|speed)|(velocity|speed|\bv)[-_ ]?inlet|(advance|flight)[-_ ](speed|velocity)",
     "cells": CELLS.pattern,
 }
 """Headings of a quantity in CFD beside those that benches have as well (`usual`)."""
@@ -192,10 +192,8 @@ class OpenRun:
                     self.fault(c, c.name, got, f"one of {dimension.replace('_', ' ')}", hint)
             return hits
         taken = {getattr(self.run.columns, q).column for q in QUANTITIES if getattr(self.run.columns, q) is not None}
-        return _recorded(
-            [c for c in self.columns if not (c.name in taken or c.stem in taken or c.axis)
-             and _fits(c, quantity, self.fact(quantity).unit)]  # fmt: skip
-        )
+        free = (c for c in self.columns if not (c.name in taken or c.stem in taken or c.axis))
+        return _recorded([c for c in free if _fits(c, quantity, self.fact(quantity).unit)])
 
     def si(self, quantity: str, c: LoadColumn) -> Array | None:
         """Values of a column in SI (rev/min for a speed); a missing unit is a fault."""
