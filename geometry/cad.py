@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -26,10 +26,11 @@ from geometry.solid import Mesh, StatorPlan, centre_body, duct_profile, plan_sta
 MM = 1000.0
 TOLERANCE = 5e-3
 SOUND = 1.5e-3  # volume error of a fused solid above which the next try may be better: some surfaces then cross
-_POINTS = 45
+_POINTS, _NEAR = 45, 1e-4
+_POINTED = 0.01  # chord over R from which on to the tip a section is the last one: a loft takes no point
 TRIED = ((45, 8e-3), (45, 15e-3), (61, 8e-3), (45, 3e-3), (37, 8e-3))
-"""Points of a section and least distance of sections over R of printed blades, tried in turn: the CAD kernel fuses most
-of them, and says nothing when it loses a blade."""
+"""Points of a section and least distance of sections over R, tried in turn where blades are printed or do not loft as
+they are: the CAD kernel fuses most of them, and says nothing when it loses a blade."""
 
 
 @contextmanager
@@ -59,7 +60,7 @@ class Parts:
 
 
 def planar_sections(
-    rotor: Rotor, options: Options | None = None, count: int = _POINTS, apart: float = 1e-4
+    rotor: Rotor, options: Options | None = None, count: int = _POINTS, apart: float = _NEAR
 ) -> list[tuple[float, Array]]:
     """Cut the wrapped blade by planes across its pitch axis. [m]
 
@@ -76,6 +77,8 @@ def planar_sections(
     step = 0.02 * rotor.R
     fine = replace(options, n=count)
     curves = np.stack([wrapped_outline(blade, float(r), fine) for r in rho])
+    whole = np.flatnonzero(np.linalg.norm(np.ptp(curves, axis=1), axis=1) > _POINTED * rotor.R)
+    curves[whole[-1] + 1 :] = curves[whole[-1]]
     angle = curves[..., 0] / rho[:, None]
     if np.abs(angle).max() > 1.3:
         got = f"a section that reaches {math.degrees(np.abs(angle).max()):.0f} deg round the shaft"
@@ -107,7 +110,7 @@ def planar_sections(
         raise GeometryError([("chord", "a blade too wide for its hub", "a root that ends inside the hub", hint)])
     planes = np.unique(np.concatenate([[root], rho[(rho > 1.01 * root) & (rho < rotor.R)], [rotor.R + 0.4 * step]]))
     if printed is None:
-        planes = planes[np.concatenate([[True], np.diff(planes) > apart * rotor.R])]
+        planes = _apart(planes, apart * rotor.R)
     else:
         high = rotor.Rhub + (printed.blend or 0.0)
         flare = np.linspace(root, high, 1 + math.ceil((high - root) / max(0.2 * (high - rotor.Rhub), 2e-3 * rotor.R)))
@@ -233,19 +236,45 @@ def blade_solid(rotor: Rotor, options: Options | None = None) -> tuple[Any, Arra
     if not rotor.blade.anchors:
         raise GeometryError([("anchors", "none", "one section or more", "A solid needs sections")])
     profile = hub_profile(rotor, wrapped_outline(rotor.blade, rotor.Rhub, options))
-    with kernel("blade", "sections that can be lofted", "Use the mesh formats, which need no loft"):
-        loft = _fixed(_loft(planar_sections(rotor, options)))
-        low, high = 2 * float(profile[:, 1].min()) * MM - rotor.R * MM, 2 * rotor.R * MM + 4 * rotor.R * MM
-        low_point = cq.Vector(0, 0, low)
-        tip = cq.Solid.makeCylinder(rotor.R * MM, high, low_point)
-        core = cq.Solid.makeCylinder(rotor.Rhub * MM, high, low_point)
-        solid = _one(loft.intersect(tip).cut(core), "blade")
-    expected = blade_volume(rotor.blade, options) * MM**3
-    if abs(solid.Volume() / expected - 1) > TOLERANCE:
-        off = 100 * (solid.Volume() / expected - 1)
-        got = f"a CAD solid whose volume is {off:+.2f} % off the integral of its sections"
-        raise GeometryError([("blade", got, "at most 0.5 %", "Use the mesh formats, which need no loft")])
-    return solid, profile
+
+    def solid(count: int, apart: float) -> Any:
+        with kernel("blade", "sections that can be lofted", "Use the mesh formats, which need no loft"):
+            loft = _fixed(_loft(planar_sections(rotor, options, count, apart)))
+            low, high = 2 * float(profile[:, 1].min()) * MM - rotor.R * MM, 2 * rotor.R * MM + 4 * rotor.R * MM
+            low_point = cq.Vector(0, 0, low)
+            tip = cq.Solid.makeCylinder(rotor.R * MM, high, low_point)
+            core = cq.Solid.makeCylinder(rotor.Rhub * MM, high, low_point)
+            return _one(loft.intersect(tip).cut(core), "blade")
+
+    whole = blade_volume(rotor.blade, options)
+    hint = "Use the mesh formats, which need no loft"
+    return _tried(solid, whole, ((_POINTS, _NEAR), *TRIED), TOLERANCE, hint), profile
+
+
+def _tried(
+    make: Callable[[int, float], Any], volume: float, ways: Sequence[tuple[int, float]], good: float, hint: str
+) -> Any:  # fmt: skip
+    """First solid of some numbers of points and distances of planes whose volume [m^3] is off by less than ``good``.
+
+    Else the nearest within `TOLERANCE`: a smooth loft of many planes may fold between them, or be open.
+    """
+    last, close = GeometryError([]), []
+    for count, apart in ways:
+        try:
+            solid = make(count, apart)
+        except GeometryError as error:
+            last = error
+            continue
+        off = solid.Volume() / MM**3 / volume - 1
+        if abs(off) < good:
+            return solid
+        if abs(off) < TOLERANCE:
+            close.append((abs(off), solid))
+        got = f"a CAD solid whose volume is {100 * off:+.2f} % off the integral of its sections"
+        last = GeometryError([("blade", got, f"at most {100 * TOLERANCE:g} %", hint)])
+    if close:
+        return min(close, key=lambda pair: pair[0])[1]
+    raise last
 
 
 def printed_solid(rotor: Rotor, options: Options, volume: float) -> Any:
@@ -256,24 +285,8 @@ def printed_solid(rotor: Rotor, options: Options, volume: float) -> Any:
     assert options.printed is not None
     sharp = replace(options, printed=replace(options.printed, round_edge=False))
     volume += rotor.B * (blade_volume(rotor.blade, sharp) - blade_volume(rotor.blade, options))
-    last, close = GeometryError([]), []
-    for count, apart in TRIED:
-        try:
-            solid = _printed_solid(rotor, sharp, count, apart)
-        except GeometryError as error:
-            last = error
-            continue
-        off = abs(solid.Volume() / MM**3 / volume - 1)
-        if off < SOUND:
-            return solid
-        if off < TOLERANCE:
-            close.append((off, solid))
-        got = f"a solid of {solid.Volume():.4g} mm^3"
-        hint = "Use stl or 3mf, which need no loft"
-        last = GeometryError([("blade", got, f"{volume * MM**3:.4g} mm^3, those of the mesh, within 0.5 %", hint)])
-    if close:
-        return min(close, key=lambda pair: pair[0])[1]
-    raise last
+    return _tried(lambda count, apart: _printed_solid(rotor, sharp, count, apart), volume, TRIED, SOUND,
+                  "Use stl or 3mf, which need no loft")  # fmt: skip
 
 
 def _printed_solid(rotor: Rotor, options: Options, count: int, apart: float) -> Any:
