@@ -27,6 +27,8 @@ SEVERAL = (
     "One condition on several grids: --setup cells=a,b,c, a number for each grid. Other runs: import each with --out, "
     "then give the .toml files together. A restart with its own clock: alone"
 )
+WALLS = "yPlus.dat"
+"""What the function object yPlus of OpenFOAM writes: no load, but how fine the first cell is."""
 SCATTERED = 0.02
 """Spread of the means of single revolutions above which a load is not periodic. [1]"""
 
@@ -57,6 +59,19 @@ def cfd_files(folder: Path) -> tuple[Path, ...]:
         except InputError:
             continue
     return tuple(out)
+
+
+def y_plus(files: Sequence[Path]) -> dict[str, float]:
+    """Mean y+ of each patch at the last time of the yPlus.dat that OpenFOAM wrote beside the forces; {}: none [1]."""
+    beside = {f.with_name(WALLS) for f in files}
+    for post in {f.parents[2] for f in files if len(f.parents) > 2}:
+        beside |= {*post.glob(f"*/*/{WALLS}")} if post.name == "postProcessing" else set()
+    out: dict[str, float] = {}
+    for path in sorted(p for p in beside if p.is_file()):
+        for cells in map(str.split, readers.load_text(path).lines):
+            if len(cells) == 5 and (average := readers.number(cells[4])) is not None:
+                out[cells[1]] = average
+    return out
 
 
 def zone_of(path: Path, form: str) -> str:

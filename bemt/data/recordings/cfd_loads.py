@@ -30,7 +30,7 @@ _ALONG = 3.0  # a thrust stands out of the side forces by this factor, or the sh
 DUCT = re.compile(r"duct|shroud|nozzle|casing|housing|\bring\b|\blip\b|kort", re.IGNORECASE)
 """Name of a zone that is the duct; a nacelle is one where no other is, else a body on the axis."""
 _STILL = re.compile(r"stator|vane|nacelle|strut|pylon|support|leitrad|(?<![a-z])(ogv|igv|pod)(?![a-z])", re.IGNORECASE)
-_TURNS = re.compile(r"blade|rotor|prop|impeller|spinner|hub|nabe|(?<![a-z])fan(?![a-z])", re.IGNORECASE)
+TURNS = re.compile(r"blade|rotor|prop|impeller|spinner|hub|nabe|(?<![a-z])fan(?![a-z])", re.IGNORECASE)
 """Names of zones that stand still, whatever else they say (``stator_blade``), and of those on the shaft."""
 _SLIGHT = 0.01
 """Share of the shaft's moment that a zone of unknown part may have without being asked about [1]."""
@@ -146,6 +146,7 @@ class OpenRun:
     zones: frozenset[str] = frozenset()  # whose forces are the thrust
     elsewhere: list[Elsewhere] = field(default_factory=list)
     unread: str = ""  # columns in which alone some rows differ
+    walls: Mapping[str, float] = field(default_factory=dict)  # mean y+ by patch [1]
     pools: dict[str, dict[str, LoadColumn]] = field(default_factory=dict)  # columns of each load by zone
 
     def fault(self, at: LoadColumn | None, where: str, got: str, expected: str, hint: str = "") -> None:
@@ -497,7 +498,7 @@ def _on_shaft(run: OpenRun, pool: Mapping[str, LoadColumn], zones: Sequence[str]
             run.fault(None, "rotor_zones", ", ".join(absent), f"zones with a torque: {', '.join(zones)}")
         return [z for z in zones if z in told]
     moment = {z: _level(pool[z]) for z in zones if not (run.is_duct(z) or _STILL.search(z))}
-    named = [z for z in moment if _TURNS.search(z)]
+    named = [z for z in moment if TURNS.search(z)]
     whole = sum(moment[z] for z in named or moment)
     against = [z for z in moment if moment[z] * whole < 0.0]
     if len(moment) == len(zones) and sum(abs(moment[z]) for z in against) <= _SLIGHT * abs(whole):

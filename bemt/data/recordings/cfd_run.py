@@ -23,11 +23,22 @@ from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import RunToml
 from bemt.data.readers.headings import channel_of, heading, meanings
 from bemt.data.readers.marks import EXPORT
-from bemt.data.recordings.cfd_files import PROGRAMS, Settled, cfd_files, clock_of, read_run, settled, zone_of
+from bemt.data.recordings.cfd_files import (
+    PROGRAMS,
+    WALLS,
+    Settled,
+    cfd_files,
+    clock_of,
+    read_run,
+    settled,
+    y_plus,
+    zone_of,
+)
 from bemt.data.recordings.cfd_loads import (
     CHANNEL,
     COEFFICIENTS,
     NET,
+    TURNS,
     LoadColumn,
     OpenRun,
     across,
@@ -154,7 +165,9 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> CfdRun:
 
 def _opened(run: RunToml, folder: Path, name: str) -> tuple[OpenRun, list[tuple[str, Dataset]]]:
     """The files of a run as they were read, and their columns side by side."""
-    read, faults = read_run([folder / f for f in run.run.files])
+    files = [folder / f for f in run.run.files]
+    walls = y_plus(files)
+    read, faults = read_run([f for f in files if f.name != WALLS or not walls])
     vectors = [(f, r) for f, r in read if any(n.startswith("force_") for n in r.values)]
     homes = {zone_of(Path(f), r.format) for f, r in vectors}
     columns = [c for file, record in read for c in columns_of(file, record, len(homes) > 1)]
@@ -165,7 +178,7 @@ def _opened(run: RunToml, folder: Path, name: str) -> tuple[OpenRun, list[tuple[
     told = {"restart": False, "joined": False, "left out": False, "rhoInf": bool(run.reference.density_kg_m3),
             "--sector": bool(run.run.sector)}  # fmt: skip
     notes = [n for _, r in read for n in r.notes if any(word in n and not said for word, said in told.items())]
-    return OpenRun(run, name, columns, complete=not faults, notes=notes, faults=faults), read
+    return OpenRun(run, name, columns, complete=not faults, notes=notes, faults=faults, walls=walls), read
 
 
 def _summed(work: OpenRun, quantity: str) -> dict[str, Settled]:
@@ -389,6 +402,8 @@ def _conditions(
         "cells": float(each[0]) if each is not None and np.unique(each).size == 1 else cells,
         "steady": False if "time" in clocks else True if "iteration" in clocks else None, "thrust_from": "forces",
     }  # fmt: skip
+    fine = [v for k, v in work.walls.items() if TURNS.search(k)] or list(work.walls.values())
+    found["y_plus"] = float(np.mean(fine)) if fine else None
     more = {"drift_thrust": drift, "u_grid": _stated_grid(work).get("thrust_N")}
     return {k: v for part in (found, work.run.setup.given(), more) for k, v in part.items() if v is not None}
 

@@ -106,8 +106,8 @@ def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str], list
         reach = _outermost(Path(wanted.stations))
         at = f", outermost station at {1e3 * reach[0]:.5g} mm" if reach else ""
         hub = 1e3 * case.diameter_m * case.get("rotor.hub_ratio")
-        assumed.append(f"taken: diameter {1e3 * case.diameter_m:.5g} mm{whence}{at}, {case.get('rotor.blades')} blades, "
-                       f"hub {hub:.3g} mm, by the innermost station; yours: hub_ratio in case.toml")  # fmt: skip
+        size = f"diameter {1e3 * case.diameter_m:.5g} mm{whence}{at}, {case.get('rotor.blades')} blades"
+        assumed.append(f"taken: {size}, hub {hub:.3g} mm, by the innermost station; yours: hub_ratio in case.toml")
     bare = wanted.label and not (wanted.stations or wanted.scan or wanted.fan or wanted.series)
     kind = [line for line in [fresh.open_kind(str(wanted.label), wanted.blades)] if line] if bare else []
     return folder, sorted(files), [*assumed, *kind, *notes, *unused]
