@@ -141,7 +141,6 @@ def helix(
     hub: float = 0.15,
     *,
     max_chord: float | None = None,
-    dbeta: float = 0.0,
     anchors: Airfoil | Sequence[tuple[float, Airfoil]] | None = None,
     n: int = 61,
     name: str = "",
@@ -157,6 +156,5 @@ def helix(
     limit = 5 * abs(diameter) if math.isfinite(diameter) else math.inf
     faults.number("pitch", pitch, -limit, limit, "m", "Both diameter and pitch are in metres")
     faults.check()
-    blade = from_laws(diameter, chord_law, "helix", hub, chord={"max_chord": max_chord}, pitch={"pitch": pitch},
-                      anchors=anchors, n=n, name=name)  # fmt: skip
-    return blade.with_pitch_offset(dbeta) if dbeta else blade
+    return from_laws(diameter, chord_law, "helix", hub, chord={"max_chord": max_chord}, pitch={"pitch": pitch},
+                     anchors=anchors, n=n, name=name)  # fmt: skip

@@ -78,10 +78,9 @@ def test_blade_area_converges_at_second_order(law: str, spacing: str) -> None:
     assert math.log2(errors[1] / errors[2]) > 1.8
 
 
-@pytest.mark.parametrize("interpolation", ["pchip", "linear"])
-def test_values_are_met_at_stations_kept_between_them_and_held_outside(interpolation: str) -> None:
+def test_values_are_met_at_stations_kept_between_them_and_held_outside() -> None:
     b = stations()
-    blade = from_stations(b.r, b.chord, b.beta, b.R, b.Rhub, interpolation=interpolation)
+    blade = from_stations(b.r, b.chord, b.beta, b.R, b.Rhub)
     np.testing.assert_allclose(blade.at(b.r)[0], b.chord, rtol=1e-14)
     np.testing.assert_allclose(blade.at(b.r)[1], b.beta, rtol=1e-14)
     inside = np.linspace(b.r[0], b.r[-1], 400)
@@ -89,9 +88,6 @@ def test_values_are_met_at_stations_kept_between_them_and_held_outside(interpola
     assert (np.diff(beta) < 0).all()  # monotone data stay monotone: no overshoot
     for r, k in ((0.0, 0), (b.Rhub, 0), (0.2, -1)):
         assert [float(v) for v in blade.at(r)] == pytest.approx([b.chord[k], b.beta[k]], rel=1e-14)
-    middle = 0.5 * (b.r[3] + b.r[4])
-    straight = 0.5 * (b.beta[3] + b.beta[4])
-    assert (float(blade.at(middle)[1]) == pytest.approx(straight, rel=1e-14)) == (interpolation == "linear")
 
 
 # shape ---------------------------------------------------------------------------------------------------------------
@@ -104,7 +100,7 @@ def test_helix_has_one_pitch(D: float, P: float) -> None:
     for x in (0.3, 0.5, 0.75, 0.95):  # between stations too
         assert blade.pitch_m(x) == pytest.approx(P * INCH, rel=2e-5)
     assert blade.R == pytest.approx(0.5 * D * INCH)
-    assert helix(D * INCH, P * INCH, dbeta=0.03).beta == pytest.approx(blade.beta + 0.03)
+    assert blade.with_pitch_offset(0.03).beta == pytest.approx(blade.beta + 0.03)
 
 
 def test_sections_blend_between_anchors_and_are_held_outside() -> None:
@@ -265,7 +261,7 @@ def test_all_faults_at_once() -> None:
         from_stations(
             [0.02, 0.05, 0.04, 0.2], [0.01, 0.0, 0.01, 0.01], [30, 25, 20, 10], 0.1, 0.12,
             [(0.9, naca("0012")), (0.2, naca("0012"))], sweep=[0, 1], rake=[0, 0, math.nan, 0],
-            interpolation="spline", axis=25,
+            axis=25,
         )  # fmt: skip
     assert str(error.value) == (
         "Rhub: got 0.12 m; expected a hub radius from 0 to below R = 0.1 m.\n"
@@ -276,7 +272,6 @@ def test_all_faults_at_once() -> None:
         "sweep: got shape (2,); expected one value per station, (4,).\n"
         "rake[2]: got nan; expected a finite number.\n"
         "axis: got 25; expected a number from 0 to 1.\n"
-        "interpolation: got 'spline'; expected 'pchip' or 'linear'.\n"
         "anchors: got r/R = [0.9, 0.2]; expected ascending r/R from 0 to 1. Anchors sit at r/R, not at r."
     )
 
