@@ -15,24 +15,10 @@ from geometry.rotor import Blade, from_stations
 
 
 @dataclass(frozen=True)
-class LawParameter:
-    """A number of a law: its default and the range over which the default is uncertain (not a limit)."""
-
-    default: float
-    low: float
-    high: float
-    unit: str
-    text: str
-
-
-@dataclass(frozen=True)
 class Law:
-    """A named chord or pitch law: what it is, where it comes from, its parameters, its function of r/R."""
+    """A chord or pitch law: its parameters with their defaults (NaN: none), its function of r/R."""
 
-    name: str
-    text: str
-    source: str
-    parameters: Mapping[str, LawParameter]
+    parameters: Mapping[str, float]
     function: Callable[..., Array]
 
 
@@ -51,27 +37,20 @@ def _fan(x: Array, hub: float) -> Array:
     return out
 
 
-def _max_chord(default: float, low: float, high: float) -> dict[str, LawParameter]:
-    return {"max_chord": LawParameter(default, low, high, "-", "greatest chord over R")}
-
-
-_OURS = "declared assumption of this project"
 CHORD_LAWS: Mapping[str, Law] = {
-    law.name: law
-    for law in (
-        Law("apc_like", "generic modern two-blade small propeller: c/R 0.13 at r/R 0.15, greatest near 0.43, 0.13 at "
-            "0.75, 0.04 at the tip (fifth-degree polynomial)", _OURS, _max_chord(0.195, 0.15, 0.24), _apc_like),
-        Law("elliptic", "c = c0 sqrt(1 - (r/R)^2), c0 on the axis; not below 5 % of c0", "elliptic planform",
-            _max_chord(0.20, 0.15, 0.26), _elliptic),
-        Law("constant", "the same chord from hub to tip", "rectangular planform", _max_chord(0.15, 0.10, 0.20),
-            lambda x, hub: np.ones_like(x)),
-        Law("linear_taper", "straight from the hub to taper times the hub chord at the tip", "trapezoidal planform",
-            {**_max_chord(0.20, 0.15, 0.26), "taper": LawParameter(0.5, 0.3, 1.0, "-", "tip chord over hub chord")},
-            lambda x, hub, taper: 1 - (1 - taper) * (x - hub) / (1 - hub)),
-        Law("fan", "ducted fan: nearly constant, 10 % less at hub and tip than at mid span", _OURS,
-            _max_chord(0.45, 0.30, 0.60), _fan),
-    )
-}  # fmt: skip
+    # generic modern two-blade small propeller: c/R 0.13 at r/R 0.15, greatest near 0.43, 0.13 at 0.75, 0.04 at the tip
+    # (fifth-degree polynomial); declared assumption of this project
+    "apc_like": Law({"max_chord": 0.195}, _apc_like),
+    # c = c0 sqrt(1 - (r/R)^2), c0 on the axis; not below 5 % of c0
+    "elliptic": Law({"max_chord": 0.20}, _elliptic),
+    "constant": Law({"max_chord": 0.15}, lambda x, hub: np.ones_like(x)),
+    # straight from the hub to taper times the hub chord at the tip
+    "linear_taper": Law(
+        {"max_chord": 0.20, "taper": 0.5}, lambda x, hub, taper: 1 - (1 - taper) * (x - hub) / (1 - hub)
+    ),
+    # ducted fan: nearly constant, 10 % less at hub and tip than at mid span; declared assumption of this project
+    "fan": Law({"max_chord": 0.45}, _fan),
+}
 """Chord laws by name; each function gives chord over greatest chord at r/R for a hub ratio."""
 
 
@@ -82,24 +61,11 @@ def _tip_relieved(x: Array, R: float, hub: float, pitch: float, relief: float, s
 
 
 PITCH_LAWS: Mapping[str, Law] = {
-    law.name: law
-    for law in (
-        Law("helix", "constant pitch: beta = atan(pitch / (2 pi r))", "true screw",
-            {"pitch": LawParameter(math.nan, 0.0, math.inf, "m", "advance per turn")},
-            lambda x, R, hub, pitch: np.arctan(pitch / (2 * np.pi * x * R))),
-        Law("linear_twist", "beta straight in r from hub to tip", "usual for rotors",
-            {"beta_root": LawParameter(math.nan, 0.0, math.pi / 2, "rad", "blade angle at the hub"),
-             "beta_tip": LawParameter(math.nan, 0.0, math.pi / 2, "rad", "blade angle at the tip")},
-            lambda x, R, hub, beta_root, beta_tip: beta_root + (beta_tip - beta_root) * (x - hub) / (1 - hub)),
-        Law("constant_beta", "untwisted blade (such as NASA TM-81232)", "untwisted",
-            {"beta": LawParameter(math.nan, 0.0, math.pi / 2, "rad", "collective angle")},
-            lambda x, R, hub, beta: np.full_like(x, beta)),
-        Law("tip_relieved", "constant pitch to r/R = start, then it falls quadratically by `relief` at the tip", _OURS,
-            {"pitch": LawParameter(math.nan, 0.0, math.inf, "m", "advance per turn inboard"),
-             "relief": LawParameter(0.15, 0.0, 0.4, "-", "fraction of the pitch lost at the tip"),
-             "start": LawParameter(0.7, 0.5, 0.9, "-", "r/R where the relief begins")}, _tip_relieved),
-    )
-}  # fmt: skip
+    # true screw: beta = atan(pitch / (2 pi r))
+    "helix": Law({"pitch": math.nan}, lambda x, R, hub, pitch: np.arctan(pitch / (2 * np.pi * x * R))),
+    # constant pitch to r/R = start, then it falls quadratically by `relief` at the tip; assumption of this project
+    "tip_relieved": Law({"pitch": math.nan, "relief": 0.15, "start": 0.7}, _tip_relieved),
+}
 """Pitch laws by name; each function gives beta [rad] at r/R for R [m] and a hub ratio."""
 
 
@@ -107,23 +73,14 @@ def _arguments(kind: str, laws: Mapping[str, Law], name: str, given: Mapping[str
     """Defaults and given parameters of a law, or its faults."""
     if name not in laws:
         raise GeometryError([(kind, repr(name), f"one of {', '.join(laws)}", "")])
-    faults, law = Faults(), laws[name]
-    for key in given:
-        if key not in law.parameters:
-            faults.add(f"{kind}.{key}", key, f"a parameter of '{name}': {', '.join(law.parameters)}")
-    values = {key: given.get(key) for key in law.parameters}
-    out = {key: law.parameters[key].default if v is None else float(v) for key, v in values.items()}
+    faults = Faults()
+    out = {**laws[name].parameters, **{key: float(v) for key, v in given.items() if v is not None}}
     for key, value in out.items():
         if not math.isfinite(value):
-            unit = law.parameters[key].unit
-            faults.add(f"{kind}.{key}", "nothing" if given.get(key) is None else f"{value}", f"a number in {unit}")
+            faults.add(f"{kind}.{key}", "nothing" if given.get(key) is None else f"{value}", "a number")
         elif key == "max_chord" and not 0 < value <= 5:
             hint = "Chord in millimetres? Divide by R" if value > 5 else ""
             faults.add(f"{kind}.{key}", f"{value:g}", "greatest chord over R, above 0, up to 5", hint)
-        elif key == "taper" and value <= 0:
-            faults.add(f"{kind}.{key}", f"{value:g}", "a positive number")
-        elif key in ("relief", "start") and not 0 <= value < 1:
-            faults.add(f"{kind}.{key}", f"{value:g}", "a number from 0 to below 1")
     faults.check()
     return out
 
@@ -154,9 +111,9 @@ def from_laws(
 ) -> Blade:
     """Make a blade from a chord law and a pitch law.
 
-    >>> blade = from_laws(2.286, "constant", "constant_beta", 0.1, chord={"max_chord": 1 / 6}, pitch={"beta": 0.1396})
+    >>> blade = from_laws(0.254, "constant", chord={"max_chord": 1 / 6}, pitch={"pitch": 0.127})
     >>> round(float(blade.chord[0]), 4), round(float(blade.beta[-1]), 4)
-    (0.1905, 0.1396)
+    (0.0212, 0.1578)
     """
     faults = Faults()
     faults.number("diameter", diameter, 1e-3, 200.0, "m", "Given in millimetres or inches?" if diameter > 200 else "")
@@ -184,7 +141,6 @@ def helix(
     hub: float = 0.15,
     *,
     max_chord: float | None = None,
-    dbeta: float = 0.0,
     anchors: Airfoil | Sequence[tuple[float, Airfoil]] | None = None,
     n: int = 61,
     name: str = "",
@@ -200,6 +156,5 @@ def helix(
     limit = 5 * abs(diameter) if math.isfinite(diameter) else math.inf
     faults.number("pitch", pitch, -limit, limit, "m", "Both diameter and pitch are in metres")
     faults.check()
-    blade = from_laws(diameter, chord_law, "helix", hub, chord={"max_chord": max_chord}, pitch={"pitch": pitch},
-                      anchors=anchors, n=n, name=name)  # fmt: skip
-    return blade.with_pitch_offset(dbeta) if dbeta else blade
+    return from_laws(diameter, chord_law, "helix", hub, chord={"max_chord": max_chord}, pitch={"pitch": pitch},
+                     anchors=anchors, n=n, name=name)  # fmt: skip

@@ -54,7 +54,6 @@ class Blade:
     sweep: Array | None = None
     rake: Array | None = None  # (N,) offset of the pitch axis along the shaft, positive downstream [m]
     axis: float = 0.25  # Chord fraction that lies on the pitch axis and that beta turns about [-]
-    interpolation: str = "pchip"  # How chord, beta, sweep and rake run between stations
     name: str = ""  # For people
     _columns: Array = field(init=False, repr=False)
     _slopes: Array = field(init=False, repr=False)
@@ -74,8 +73,6 @@ class Blade:
         _check_radii(self, faults)
         _check_arrays(self, faults)
         faults.number("axis", self.axis, 0.0, 1.0)
-        if self.interpolation not in ("pchip", "linear"):
-            faults.add("interpolation", repr(self.interpolation), "'pchip' or 'linear'")
         positions = [x for x, _ in self.anchors]
         if any(not 0 <= x <= 1 for x in positions) or any(np.diff(positions) <= 0):
             faults.add("anchors", f"r/R = {positions}", "ascending r/R from 0 to 1", "Anchors sit at r/R, not at r")
@@ -87,11 +84,7 @@ class Blade:
 
     def _at(self, r: ArrayLike) -> Array:
         """Chord, beta, sweep, rake (..., 4) at radii, held outside the stations."""
-        if self.interpolation == "pchip":
-            return pchip(self.r, self._columns, r, self._slopes)
-        q = np.asarray(r, dtype=np.float64)
-        out: Array = np.stack([np.interp(q, self.r, column) for column in self._columns.T], axis=-1)
-        return out
+        return pchip(self.r, self._columns, r, self._slopes)
 
     def at(self, r: ArrayLike) -> tuple[Array, Array]:
         """Interpolate chord and blade angle; outside the stations the end values are held."""
@@ -164,7 +157,7 @@ class Blade:
     def key(self) -> str:
         """Return the SHA-256 (hex) of all numbers to 12 digits and the section keys: equal blades, equal keys."""
         numbers = np.concatenate([self.r, self._columns.ravel(), [self.R, self.Rhub, self.axis]])
-        text = ",".join(f"{v + 0.0:.12g}" for v in numbers) + self.interpolation
+        text = ",".join(f"{v + 0.0:.12g}" for v in numbers) + "pchip"
         text += "".join(f"{x:.12g}{section.key()}" for x, section in self.anchors)
         return hashlib.sha256(text.encode()).hexdigest()
 
@@ -238,7 +231,6 @@ def from_stations(
     sweep: ArrayLike | None = None,
     rake: ArrayLike | None = None,
     axis: float = 0.25,
-    interpolation: str = "pchip",
     name: str = "",
 ) -> Blade:
     """Make a blade from tabulated stations.
@@ -250,7 +242,7 @@ def from_stations(
     beta[0]: got 20 rad; expected radians from -pi/2 to pi/2. Given in degrees? Multiply by pi/180.
     """
     pairs = ((0.0, anchors),) if isinstance(anchors, Airfoil) else tuple(anchors or ())
-    return Blade(r, chord, beta, R, Rhub, pairs, sweep, rake, axis, interpolation, name)  # type: ignore[arg-type]
+    return Blade(r, chord, beta, R, Rhub, pairs, sweep, rake, axis, name)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True, eq=False)

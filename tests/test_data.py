@@ -275,13 +275,6 @@ def test_what_the_user_added_or_changed_is_not_deleted(server, tmp_path):
     assert data.get("uiuc", folder, archive).checksum == "as recorded"
     table.unlink()  # what is missing is put back
     assert data.get("uiuc", folder, archive).files == 4 and table.read_text() == GEOM
-    record = folder / data.RECORD  # of an earlier version: without names
-    record.write_text(json.dumps({k: v for k, v in json.loads(record.read_text()).items() if k != "names"}))
-    mine.parent.mkdir(exist_ok=True)
-    mine.write_text("days of work")
-    refused("5 files where its record counts 4")
-    mine.unlink()
-    assert data.get("uiuc", folder, archive).checksum == "as recorded"
 
 
 def test_a_mirror_beside_a_local_archive_is_refused(tmp_path, capsys):

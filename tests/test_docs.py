@@ -473,7 +473,6 @@ def test_every_imported_library_is_declared(project: Path) -> None:
     comes_with = {
         "ocp": "cadquery",
         "pil": "matplotlib",
-        "requests": "pooch",
         "pydantic_core": "pydantic",
         "python_calamine": "python-calamine",  # its name when it is imported
         "pythrust": "setuav-pythrust",

@@ -17,7 +17,7 @@ from geometry.common import GeometryError
 from geometry.duct import Duct, Stator, around
 from geometry.laws import from_laws, helix
 from geometry.mesh import MeshModel, Options, build, rotor_mesh, surfaces
-from geometry.rotor import Rotor
+from geometry.rotor import Rotor, from_stations
 from geometry.rotor_axis import blades
 from geometry.slicing import FoundRotor, find_rotor
 from geometry.solid import check_closed
@@ -291,7 +291,7 @@ def test_cad_mesh_and_sections_have_one_volume(name: str, project: Path) -> None
 
 def test_planar_sections_lie_on_the_wrapped_blade() -> None:
     section = naca4(0.03, 0.4, 0.1)
-    rotor = Rotor(from_laws(0.2, "constant", "constant_beta", 0.3, pitch={"beta": 0.5}, anchors=section), 4)
+    rotor = Rotor(from_stations([0.03, 0.1], [0.015] * 2, [0.5] * 2, 0.1, 0.03, section), 4)
     curve = rotor.blade.section_curve(0.08, 45)
     for plane, points in planar_sections(rotor):
         if 0.03 < plane < 0.095:  # the section is the same everywhere: t = rho asin(y/rho), z as it is
@@ -311,8 +311,7 @@ def test_tessellation_follows_its_tolerance_and_old_triangles() -> None:
 def test_what_makes_no_cad_solid_is_refused_with_the_reason() -> None:
     with pytest.raises(GeometryError, match="anchors: got none"):
         solids(Rotor(helix(0.2, 0.1), 2))
-    wide = from_laws(0.2, "constant", "constant_beta", 0.1, chord={"max_chord": 0.5}, pitch={"beta": 0.1},
-                     anchors=naca4(0.0, 0.4, 0.1))  # fmt: skip
+    wide = from_stations([0.01, 0.1], [0.05] * 2, [0.1] * 2, 0.1, 0.01, naca4(0.0, 0.4, 0.1))
     with pytest.raises(GeometryError, match="round the shaft"):
         solids(Rotor(wide, 2), options=Options())
 

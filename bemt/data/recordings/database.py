@@ -43,60 +43,51 @@ _BLOCK = 1 << 16
 Progress = Callable[[int, int], None]
 
 
-def _get(url: str, target: str, progress: Progress | None) -> None:
-    """Fetch a file, whole and of no more bytes than an archive may have."""
-    import requests
-
-    with requests.get(url, headers={"Accept-Encoding": "identity"}, stream=True, timeout=(20, 60)) as answer:
-        answer.raise_for_status()
-        length, have = answer.headers.get("Content-Length", ""), 0
-        total = int(length) if length.isdigit() else 0
-        _limit(url, total)
-        with open(target, "wb") as stream:
-            for block in answer.iter_content(_BLOCK):
-                stream.write(block)
-                have += len(block)
-                _limit(url, have)
-                if progress is not None:
-                    progress(have, total)
-    if total and have != total:
-        raise InputError(Fault(url, "", f"{have} of {total} bytes", "the whole file", "Run the command again"))
-
-
 def _limit(url: str, size: int) -> None:
     if size > MAX_ARCHIVE:
         raise InputError(Fault(url, "", f"{size} bytes", f"at most {MAX_ARCHIVE} bytes", "Is this the archive?"))
 
 
-def download(url: str, target: Path, known_sha256: str | None = None, progress: Progress | None = None) -> str:
-    """Fetch a file with pooch, which checks its hash and leaves nothing of one that came in part."""
-    import logging
-
-    import pooch
+def _get(url: str, target: Path, progress: Progress | None) -> None:
+    """Fetch a file, whole and of no more bytes than an archive may have."""
     import requests
 
-    def fetch(url: str, output: str, _: Any) -> None:
-        _get(url, output, progress)
-
-    target.parent.mkdir(parents=True, exist_ok=True)
-    pooch.get_logger().setLevel(logging.WARNING)
-    target.unlink(missing_ok=True)
     try:
-        pooch.retrieve(url, known_sha256, target.name, str(target.parent), downloader=fetch)
-    except InputError:  # a ValueError too
+        with requests.get(url, headers={"Accept-Encoding": "identity"}, stream=True, timeout=(20, 60)) as answer:
+            answer.raise_for_status()
+            length, have = answer.headers.get("Content-Length", ""), 0
+            total = int(length) if length.isdigit() else 0
+            _limit(url, total)
+            with target.open("wb") as stream:
+                for block in answer.iter_content(_BLOCK):
+                    stream.write(block)
+                    have += len(block)
+                    _limit(url, have)
+                    if progress is not None:
+                        progress(have, total)
+    except requests.RequestException as error:
+        got = str(error).split("(Caused")[0].strip()[:200] or type(error).__name__
+        hint = "Download it manually and give it with --source FILE.zip"
+        raise InputError(Fault(url, "", got, "an archive to fetch", hint)) from error
+    except OSError as error:
+        raise InputError(Fault(os.fspath(target), "", str(error), "room and permission to write")) from error
+    if total and have != total:
+        raise InputError(Fault(url, "", f"{have} of {total} bytes", "the whole file", "Run the command again"))
+
+
+def download(url: str, target: Path, known_sha256: str | None = None, progress: Progress | None = None) -> str:
+    """Fetch a file and check its hash; nothing is left of one that came in part or is another."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        _get(url, target, progress)
+        digest = file_hash(target)
+        if known_sha256 not in (None, digest):
+            hint = "The archive has changed since its first use: delete the folder of the data to accept the new one"
+            raise InputError(Fault(url, "sha256", "another hash", str(known_sha256), hint))
+    except BaseException:
+        target.unlink(missing_ok=True)
         raise
-    except (requests.RequestException, OSError) as error:
-        if isinstance(error, OSError) and not isinstance(error, requests.RequestException) and error.errno is not None:
-            raise InputError(Fault(os.fspath(target), "", str(error), "room and permission to write")) from error
-        got, hint = (
-            str(error).split("(Caused")[0].strip()[:200],
-            "Download it manually and give it with --source FILE.zip",
-        )
-        raise InputError(Fault(url, "", got or type(error).__name__, "an archive to fetch", hint)) from error
-    except ValueError as error:  # pooch: the hash differs
-        hint = "The archive has changed since its first use: delete the folder of the data to accept the new one"
-        raise InputError(Fault(url, "sha256", "another hash", str(known_sha256), hint)) from error
-    return file_hash(target)
+    return digest
 
 
 def _members(archive: zipfile.ZipFile, name: str) -> list[tuple[zipfile.ZipInfo, PurePosixPath]]:
@@ -238,16 +229,12 @@ def _files(folder: Path) -> dict[str, str]:
 
 def _check_own(folder: Path, known: FetchedData) -> None:
     """Refuse to replace a folder that holds more than an earlier run put there."""
-    there, names = _files(folder), known.names
-    hint = "Move them away, or name another folder with --out"
-    if names is not None:
-        strange = [name for name, start in there.items() if names.get(name) != start]
+    names = known.names or {}
+    strange = [name for name, start in _files(folder).items() if names.get(name) != start]
+    if strange:
         got = f"files added or changed since ({len(strange)}): {', '.join(strange[:5])}"
         got += ", ..." if len(strange) > 5 else ""
-    else:  # a record of earlier versions: it only counts
-        strange = list(there) if len(there) != known.files else []
-        got = f"{number_of(len(there), 'file')} where its record counts {known.files}"
-    if strange:
+        hint = "Move them away, or name another folder with --out"
         raise InputError(Fault(os.fspath(folder), "", got, "only what this command put there", hint))
 
 

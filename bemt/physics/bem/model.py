@@ -149,7 +149,7 @@ class Model:
         rotor, blade = self.rotor, self.rotor.blade
         lines = [np.asarray(v) for v in (blade.sweep, blade.rake) if v is not None]
         shapes = [v for x, a in blade.anchors for v in (x, a.x, a.y)]
-        sizes = (blade.R, blade.Rhub, blade.axis, blade.interpolation, rotor.B, rotor.rotation, rotor.name)
+        sizes = (blade.R, blade.Rhub, blade.axis, rotor.B, rotor.rotation, rotor.name)
         hub = (rotor.hub_length, rotor.spinner_length)
         geometry = content_key(blade.r, blade.chord, blade.beta, len(lines), *lines, sizes, hub, *shapes)
         tables = tuple((x, polar.key) for x, polar in self.polars)

@@ -58,9 +58,9 @@ def _entry(cls: type[Effect]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def range_text(p: Parameter, unit: bool = True) -> str:
+def range_text(p: Parameter) -> str:
     """Lowest and highest value of a parameter."""
-    return f"{p.low:.4g} to {p.high:.4g}{f' {p.unit}' if unit and p.unit != '1' else ''}"
+    return f"{p.low:.4g} to {p.high:.4g}{f' {p.unit}' if p.unit != '1' else ''}"
 
 
 def text() -> str:
