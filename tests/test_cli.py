@@ -374,7 +374,7 @@ def test_a_slip_of_the_keyboard_is_named_as_it_was_typed(
     assert code == 2 and words in " ".join(capsys.readouterr().err.split())
 
 
-@pytest.mark.parametrize("command", ["thrusters", "motor", "cfd"])
+@pytest.mark.parametrize("command", ["motor", "cfd"])
 def test_a_missing_file_is_not_called_a_case_file_where_none_is_wanted(
     command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -16,13 +16,11 @@ from bemt.data.readers.recording_toml import RecordingToml
 from bemt.rotors.case.schema import CaseFile
 from bemt.tools.cfd.schema import CampaignFile
 from bemt.tools.drive.motor_result import MotorToml
-from bemt.tools.drive.thrusters_result import ThrustersFile
 
 MODELS: dict[str, type[Table]] = {
     "campaign": CampaignFile,
     "motor": MotorToml,
     "recording": RecordingToml,
-    "thrusters": ThrustersFile,
 }
 Path_ = tuple[Any, ...]
 
