@@ -57,11 +57,6 @@ class Balance:
     swirl: float  # Angular momentum that leaves through the open ends over the shaft torque [1]
     leaks: tuple[str, ...] = ()  # Where each residual beyond :data:`BALANCE_LIMIT` is made
 
-    @property
-    def closes(self) -> bool:
-        """Whether every residual that there is lies within the limit."""
-        return not self.leaks
-
 
 @dataclass(frozen=True)
 class _Patch:
