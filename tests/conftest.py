@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import importlib.util
 import os
 import sys
@@ -37,6 +38,14 @@ def pytest_configure(config: pytest.Config) -> None:
     cache = getattr(config, "cache", None)  # absent under -p no:cacheprovider: the user's cache serves then
     if cache is not None:
         os.environ.setdefault("BEMT_CACHE", str(cache.mkdir("bemt")))
+    gc.disable()  # until everything is collected, which stays
+
+
+def pytest_collection_finish() -> None:
+    """Look for garbage among what tests make, not among the modules and tests, which stay."""
+    gc.freeze()
+    gc.set_threshold(20_000, 50, 100)
+    gc.enable()
 
 
 @pytest.fixture(scope="session")
