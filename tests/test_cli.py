@@ -79,16 +79,8 @@ def test_importing_the_command_line_imports_nothing_heavy() -> None:
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     loaded = {name.split(".")[0] for name in done.stdout.split()}
     assert not loaded & {
-        "numpy",
-        "scipy",
-        "numba",
-        "pandas",
-        "neuralfoil",
-        "matplotlib",
-        "cadquery",
-        "trimesh",
-        "geometry",
-    }
+        "numpy", "scipy", "numba", "pandas", "neuralfoil", "matplotlib", "cadquery", "trimesh", "geometry",
+    }  # fmt: skip
 
 
 ACTIONS = sorted(registry.homes())

@@ -19,11 +19,8 @@ from bemt.tools.drive.motor_result import MotorToml
 from bemt.tools.drive.thrusters_result import ThrustersFile
 
 MODELS: dict[str, type[Table]] = {
-    "campaign": CampaignFile,
-    "motor": MotorToml,
-    "recording": RecordingToml,
-    "thrusters": ThrustersFile,
-}
+    "campaign": CampaignFile, "motor": MotorToml, "recording": RecordingToml, "thrusters": ThrustersFile,
+}  # fmt: skip
 Path_ = tuple[Any, ...]
 
 

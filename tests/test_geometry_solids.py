@@ -46,13 +46,9 @@ def random_rotor(rng: np.random.Generator) -> tuple[Rotor, Duct | None]:
         return rotor, None
     stator = Stator(int(rng.integers(3, 8)), 0.12 * diameter) if rng.random() < 0.5 else None
     duct = around(
-        rotor,
-        float(rng.uniform(0.4, 1.0)) * diameter,
-        float(rng.uniform(0.003, 0.03)) * rotor.R,
-        float(rng.uniform(0.01, 0.08)) * rotor.R,
-        exit_area_ratio=float(rng.uniform(0.8, 1.2)),
-        stator=stator,
-    )
+        rotor, float(rng.uniform(0.4, 1.0)) * diameter, float(rng.uniform(0.003, 0.03)) * rotor.R,
+        float(rng.uniform(0.01, 0.08)) * rotor.R, exit_area_ratio=float(rng.uniform(0.8, 1.2)), stator=stator,
+    )  # fmt: skip
     return rotor, duct
 
 

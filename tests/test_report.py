@@ -144,50 +144,11 @@ def tables(page: str) -> list[list[list[str]]]:
 
 
 TAGS = {
-    "html",
-    "head",
-    "meta",
-    "link",
-    "title",
-    "style",
-    "body",
-    "header",
-    "h1",
-    "h2",
-    "h3",
-    "p",
-    "nav",
-    "ul",
-    "li",
-    "a",
-    "main",
-    "section",
-    "article",
-    "div",
-    "span",
-    "strong",
-    "code",
-    "img",
-    "figure",
-    "figcaption",
-    "svg",
-    "path",
-    "g",
-    "text",
-    "circle",
-    "canvas",
-    "button",
-    "details",
-    "summary",
-    "table",
-    "thead",
-    "tbody",
-    "tr",
-    "th",
-    "td",
-    "footer",
+    "html", "head", "meta", "link", "title", "style", "body", "header", "h1", "h2", "h3", "p", "nav", "ul", "li", "a",
+    "main", "section", "article", "div", "span", "strong", "code", "img", "figure", "figcaption", "svg", "path", "g",
+    "text", "circle", "canvas", "button", "details", "summary", "table", "thead", "tbody", "tr", "th", "td", "footer",
     "script",
-}
+}  # fmt: skip
 
 
 def assert_harmless(page: str) -> None:
@@ -622,20 +583,10 @@ class Browser:
         to_read, self.write = os.pipe()
         self.read, to_write = os.pipe()
         flags = [
-            "--headless",
-            "--no-sandbox",
-            "--disable-gpu",
-            "--enable-unsafe-swiftshader",
-            "--disable-quic",
-            "--no-first-run",
-            "--disable-sync",
-            "--disable-background-networking",
-            "--disable-component-update",
-            "--disable-dev-shm-usage",
-            "--remote-debugging-pipe",
-            f"--user-data-dir={profile}",
-            "about:blank",
-        ]
+            "--headless", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-quic",
+            "--no-first-run", "--disable-sync", "--disable-background-networking", "--disable-component-update",
+            "--disable-dev-shm-usage", "--remote-debugging-pipe", f"--user-data-dir={profile}", "about:blank",
+        ]  # fmt: skip
         self.process = subprocess.Popen(
             [sys.executable, "-c", RELAY, str(to_read), str(to_write), program, *flags],
             pass_fds=(to_read, to_write),

@@ -658,16 +658,11 @@ def other_thrust(data: bytes) -> bytes:
 @pytest.mark.parametrize(
     ("name", "damage", "again"),
     [
-        ("grid.csv", cut, True),
-        ("grid.csv", other_digit, True),
-        ("grid.csv", lambda data: data + b"\n", True),
-        ("result.json", other_thrust, True),
-        ("result.json", without_rows, True),
-        ("result.json", lambda data: b"[]", True),
-        ("table.txt", cut, False),
-        ("table.txt", None, False),
+        ("grid.csv", cut, True), ("grid.csv", other_digit, True), ("grid.csv", lambda data: data + b"\n", True),
+        ("result.json", other_thrust, True), ("result.json", without_rows, True),
+        ("result.json", lambda data: b"[]", True), ("table.txt", cut, False), ("table.txt", None, False),
     ],
-)
+)  # fmt: skip
 def test_what_was_damaged_is_made_again(
     tmp_path: Path, counted: list[str], name: str, damage: Callable[[bytes], bytes] | None, again: bool
 ) -> None:
