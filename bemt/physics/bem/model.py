@@ -156,6 +156,11 @@ class Model:
         reach = (arrays.mach_nodes(self.mach_max), arrays.re_nodes(self.re_range))
         return geometry, tables, repr(self.duct), self.n_stations, *reach
 
+    @property
+    def key(self) -> tuple[Hashable, ...]:
+        """What decides the solver's loads at any point: values, never identities."""
+        return self._content, self.effects
+
     def prepared(
         self, effects: Sequence[Effect], level: float = 1.0, stations: Stations | None = None
     ) -> solver.Prepared:
