@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from geometry.rotor import Rotor
 
 ROOT = Path(__file__).resolve().parents[1]
+KEPT_ROTORS = 800e6
+"""Bytes of prepared rotors in each worker: tests ask for the same few cases again and again [B]."""
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -42,7 +44,10 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Look for garbage among what tests make, not among the modules and tests, which stay."""
+    """Look for garbage among what tests make, not among the modules and tests, which stay; prepare a rotor once."""
+    from bemt.physics.bem.model import PREPARED
+
+    PREPARED.most = KEPT_ROTORS
     gc.freeze()
     gc.set_threshold(20_000, 50, 100)
     gc.enable()
