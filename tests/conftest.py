@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import importlib.util
 import os
 import sys
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from geometry.rotor import Rotor
 
 ROOT = Path(__file__).resolve().parents[1]
+KEPT_ROTORS = 800e6
+"""Bytes of prepared rotors in each worker: tests ask for the same few cases again and again [B]."""
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -37,6 +40,17 @@ def pytest_configure(config: pytest.Config) -> None:
     cache = getattr(config, "cache", None)  # absent under -p no:cacheprovider: the user's cache serves then
     if cache is not None:
         os.environ.setdefault("BEMT_CACHE", str(cache.mkdir("bemt")))
+    gc.disable()  # until everything is collected, which stays
+
+
+def pytest_collection_finish() -> None:
+    """Look for garbage among what tests make, not among the modules and tests, which stay; prepare a rotor once."""
+    from bemt.physics.bem.model import PREPARED
+
+    PREPARED.most = KEPT_ROTORS
+    gc.freeze()
+    gc.set_threshold(20_000, 50, 100)
+    gc.enable()
 
 
 @pytest.fixture(scope="session")

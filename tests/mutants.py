@@ -183,21 +183,11 @@ def _child(tests: str, mutant: Mutant, log: Path) -> int:
     return int(
         pytest.main(
             [
-                *files,
-                "-x",
-                "-q",
-                "--no-header",
-                "-o",
-                "addopts=",
-                "-m",
-                "not slow",
-                "-p",
-                "no:cacheprovider",
-                "-W",
+                *files, "-x", "-q", "--no-header", "-o", "addopts=", "-m", "not slow", "-p", "no:cacheprovider", "-W",
                 "ignore",
             ]
         )
-    )
+    )  # fmt: skip
 
 
 def _forked(tests: str, mutant: Mutant, log: Path) -> tuple[int, float]:

@@ -125,14 +125,11 @@ def test_sizes_reach_the_geometry(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new"),
     [
-        ("diameter_in = 10", "diameter_mm = 254"),
-        ("diameter_in = 10", "diameter_m = 0.254"),
-        ("pitch_in = 5", "pitch_mm = 127"),
-        ("pitch_in = 5", "pitch_ratio = 0.5"),
-        ("hub_ratio = 0.15", "hub_diameter_mm = 38.1"),
-        ("hub_ratio = 0.15", "hub_diameter_in = 1.5"),
+        ("diameter_in = 10", "diameter_mm = 254"), ("diameter_in = 10", "diameter_m = 0.254"),
+        ("pitch_in = 5", "pitch_mm = 127"), ("pitch_in = 5", "pitch_ratio = 0.5"),
+        ("hub_ratio = 0.15", "hub_diameter_mm = 38.1"), ("hub_ratio = 0.15", "hub_diameter_in = 1.5"),
     ],
-)
+)  # fmt: skip
 def test_units_are_only_another_way_to_write_the_same(tmp_path: Path, old: str, new: str) -> None:
     one = load_case(write(tmp_path, GOOD)).rotor().blade
     other = load_case(write(tmp_path, GOOD.replace(old, new))).rotor().blade

@@ -109,15 +109,12 @@ def test_six_thousand_injured_cases(project: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "line",
     [
-        "x = " + "[" * 3000 + "]" * 3000,
-        "x = " + "{a=" * 3000 + "1" + "}" * 3000,
-        ".".join(["a"] * 100_000) + " = 1",
-        "[" + ".".join(["a"] * 100_000) + "]",
-        "x = 1" + "0" * 400,
+        "x = " + "[" * 3000 + "]" * 3000, "x = " + "{a=" * 3000 + "1" + "}" * 3000,
+        ".".join(["a"] * 100_000) + " = 1", "[" + ".".join(["a"] * 100_000) + "]", "x = 1" + "0" * 400,
         "x = 1" + "0" * 5000,
     ],
     ids=["arrays", "tables", "key", "table name", "integer", "longer integer"],
-)
+)  # fmt: skip
 def test_what_no_case_can_hold_is_refused_in_one_line(
     project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], line: str
 ) -> None:

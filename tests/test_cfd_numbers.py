@@ -96,15 +96,12 @@ def test_few_rows_are_doubtful() -> None:
 @pytest.mark.parametrize(
     ("time", "period", "turns", "message"),
     [
-        ([1.0, 2.0], 0.0, None, "period"),
-        ([1.0, 2.0], math.nan, None, "period"),
-        ([1.0, 2.0], 1.0, 0, "revolutions"),
-        ([2.0, 1.0], 1.0, None, "do not ascend"),
-        ([1.0, 1.0], 1.0, None, "do not ascend"),
-        ([1.0, math.inf], 1.0, None, "do not ascend"),
+        ([1.0, 2.0], 0.0, None, "period"), ([1.0, 2.0], math.nan, None, "period"),
+        ([1.0, 2.0], 1.0, 0, "revolutions"), ([2.0, 1.0], 1.0, None, "do not ascend"),
+        ([1.0, 1.0], 1.0, None, "do not ascend"), ([1.0, math.inf], 1.0, None, "do not ascend"),
         ([1.0], 1.0, None, "shape"),
     ],
-)
+)  # fmt: skip
 def test_wrong_arguments(time: list[float], period: float, turns: int | None, message: str) -> None:
     with pytest.raises(InputError, match=message):
         revolution_average(time, [1.0, 1.0], period, turns)
@@ -207,15 +204,12 @@ def test_two_grids_assume_the_order_and_pay_for_it() -> None:
 @pytest.mark.parametrize(
     ("values", "r", "flag"),
     [
-        ([1.0, 1.1, 1.05], [2, 2], "oscillatory"),
-        ([1.0, 1.1, 1.15], [2, 2], "divergent"),
-        ([1.0, 1.001, 1.2], [2, 2], "implausible order 7.6"),
-        ([1.0, 1.1, 1.21], [2, 2], "implausible order 0.1"),
-        ([1.0, 1.0, 1.1], [2, 2], "agree exactly"),
-        ([1.0, 1.1, 1.1], [2, 2], "agree exactly"),
+        ([1.0, 1.1, 1.05], [2, 2], "oscillatory"), ([1.0, 1.1, 1.15], [2, 2], "divergent"),
+        ([1.0, 1.001, 1.2], [2, 2], "implausible order 7.6"), ([1.0, 1.1, 1.21], [2, 2], "implausible order 0.1"),
+        ([1.0, 1.0, 1.1], [2, 2], "agree exactly"), ([1.0, 1.1, 1.1], [2, 2], "agree exactly"),
         ([1.0, 1.001, 1.0025], [1.2, 1.2], "ratio 1.2 below 1.3"),
     ],
-)
+)  # fmt: skip
 def test_what_is_wrong_is_flagged_and_costs_uncertainty(values: list[float], r: list[float], flag: str) -> None:
     s = grid_study(values, r)
     assert any(flag in text for text in s.flags), s.flags
@@ -228,12 +222,10 @@ def test_what_is_wrong_is_flagged_and_costs_uncertainty(values: list[float], r: 
 @pytest.mark.parametrize(
     ("values", "r", "message"),
     [
-        ([1.0, 2.0, 3.0], [2.0, 0.5], "List the finest grid first"),
-        ([0.0, 2.0], [2.0], "other than zero"),
-        ([1.0, math.nan], [2.0], "finite values"),
-        ([1.0, 2.0], [1.0], "numbers above 1"),
+        ([1.0, 2.0, 3.0], [2.0, 0.5], "List the finest grid first"), ([0.0, 2.0], [2.0], "other than zero"),
+        ([1.0, math.nan], [2.0], "finite values"), ([1.0, 2.0], [1.0], "numbers above 1"),
     ],
-)
+)  # fmt: skip
 def test_wrong_input(values: list[float], r: list[float], message: str) -> None:
     with pytest.raises(InputError, match=message):
         grid_study(values, r)
@@ -254,35 +246,15 @@ def test_any_finite_values_give_a_study(values: list[float], r21: float, r32: fl
 
 
 TOPICS = [
-    "domain against disk",
-    "compressibility against tip Mach",
-    "grid study",
-    "iterative drift",
-    "balance of mass and momentum",
-    "wall treatment against y+",
-    "turbulence model",
-    "where the thrust was read",
+    "domain against disk", "compressibility against tip Mach", "grid study", "iterative drift",
+    "balance of mass and momentum", "wall treatment against y+", "turbulence model", "where the thrust was read",
     "frozen rotor against inflow",
-]
+]  # fmt: skip
 GOOD = CfdFacts(
-    M_tip=0.625,
-    J=0.0,
-    pitch_over_D=0.625,
-    CT=0.1,
-    domain_over_D=5.0,
-    compressible=True,
-    grids=3,
-    u_grid=0.012,
-    cells=847e3,
-    drift=0.002,
-    mass_balance=-0.001,
-    momentum_balance=0.003,
-    wall="automatic",
-    y_plus=51.0,
-    turbulence="k-omega SST",
-    thrust_from="forces",
-    steady_mrf=True,
-)
+    M_tip=0.625, J=0.0, pitch_over_D=0.625, CT=0.1, domain_over_D=5.0, compressible=True, grids=3, u_grid=0.012,
+    cells=847e3, drift=0.002, mass_balance=-0.001, momentum_balance=0.003, wall="automatic", y_plus=51.0,
+    turbulence="k-omega SST", thrust_from="forces", steady_mrf=True,
+)  # fmt: skip
 THESIS = (
     "Fluent; rotating cell zone in a cylinder of the propeller's diameter, realizable k-epsilon with scalable wall "
     "functions; thrust read at one node; no mesh count and no grid study"
@@ -332,16 +304,12 @@ def test_the_thesis_is_found_out() -> None:
 @pytest.mark.parametrize(
     ("compressible", "M", "status", "u"),
     [
-        (True, 1.09, "fine", 0.0),
-        (False, 0.2, "fine", 0.063 * (0.2 / 0.625) ** 2),
-        (False, 0.45, "doubtful", 0.063 * (0.45 / 0.625) ** 2),
-        (False, 0.625, "fault", 0.063),
-        (False, 0.94, "fault", math.nan),
-        (None, 0.625, "not stated", 0.063 / math.sqrt(3)),
-        (None, 0.94, "not stated", math.nan),
-        (None, 0.2, "fine", 0.063 * (0.2 / 0.625) ** 2),
+        (True, 1.09, "fine", 0.0), (False, 0.2, "fine", 0.063 * (0.2 / 0.625) ** 2),
+        (False, 0.45, "doubtful", 0.063 * (0.45 / 0.625) ** 2), (False, 0.625, "fault", 0.063),
+        (False, 0.94, "fault", math.nan), (None, 0.625, "not stated", 0.063 / math.sqrt(3)),
+        (None, 0.94, "not stated", math.nan), (None, 0.2, "fine", 0.063 * (0.2 / 0.625) ** 2),
     ],
-)
+)  # fmt: skip
 def test_compressibility_follows_the_tip_mach_number(
     compressible: bool | None, M: float, status: str, u: float
 ) -> None:
@@ -368,17 +336,11 @@ def test_no_number_is_made_up_where_the_correction_does_not_hold(size: float) ->
 @pytest.mark.parametrize(
     ("wall", "y_plus", "status"),
     [
-        ("function", 60.0, "fine"),
-        ("function", 12.0, "doubtful"),
-        ("scalable", 400.0, "fault"),
-        ("automatic", 2.0, "fine"),
-        ("automatic", 16.0, "doubtful"),
-        ("resolved", 0.8, "fine"),
-        ("resolved", 25.0, "fault"),
-        ("", 50.0, "not stated"),
-        ("function", math.nan, "not stated"),
+        ("function", 60.0, "fine"), ("function", 12.0, "doubtful"), ("scalable", 400.0, "fault"),
+        ("automatic", 2.0, "fine"), ("automatic", 16.0, "doubtful"), ("resolved", 0.8, "fine"),
+        ("resolved", 25.0, "fault"), ("", 50.0, "not stated"), ("function", math.nan, "not stated"),
     ],
-)
+)  # fmt: skip
 def test_wall_treatment_goes_with_its_first_cell(wall: str, y_plus: float, status: str) -> None:
     assert line(replace(GOOD, wall=wall, y_plus=y_plus), TOPICS[5]).status == status
 
@@ -393,14 +355,11 @@ def test_a_frozen_rotor_does_not_see_skewed_inflow(skew: float, steady: bool, st
 @pytest.mark.parametrize(
     ("mass", "momentum", "status", "u"),
     [
-        (0.001, -0.004, "fine", 0.004),
-        (0.11, 0.001, "fault", math.nan),
-        (0.001, -0.13, "fault", math.nan),
-        (math.nan, 0.13, "fault", math.nan),
-        (0.001, math.nan, "not stated", math.nan),
+        (0.001, -0.004, "fine", 0.004), (0.11, 0.001, "fault", math.nan), (0.001, -0.13, "fault", math.nan),
+        (math.nan, 0.13, "fault", math.nan), (0.001, math.nan, "not stated", math.nan),
         (math.nan, math.nan, "not stated", math.nan),
     ],
-)
+)  # fmt: skip
 def test_a_flow_that_does_not_balance_is_a_fault(mass: float, momentum: float, status: str, u: float) -> None:
     item = line(replace(GOOD, mass_balance=mass, momentum_balance=momentum), TOPICS[4])
     assert item.status == status and item.u_relative == pytest.approx(u, nan_ok=True)

@@ -454,16 +454,9 @@ def test_the_grid_is_named_before_any_physics(put: Callable[..., Path], capsys: 
     files = fluent(put)
     for name, cells in (("coarse", "1e6"), ("fine", "4e6")):
         args = [
-            "--rpm",
-            "8000",
-            "--unit",
-            "thrust=N",
-            "--unit",
-            "torque=N m",
-            "--setup",
-            f"cells={cells}",
+            "--rpm", "8000", "--unit", "thrust=N", "--unit", "torque=N m", "--setup", f"cells={cells}",
             f"grid_level={name}",
-        ]
+        ]  # fmt: skip
         assert main(["import", *files, *args, "--out", f"{name}.toml"]) == 0
     a, b = load_run("coarse.toml"), load_run("fine.toml")
     assert conditions_that_differ(a, b) == {"grid_level": ("coarse", "fine"), "cells": ("1,000,000", "4,000,000")}

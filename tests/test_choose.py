@@ -64,12 +64,9 @@ def test_the_first_is_the_smallest_near_the_least_power_and_the_least_is_the_sec
 
 def test_hover_lifts_the_propulsion_and_what_a_large_rotor_weighs_makes_the_optimum_finite() -> None:
     ask = {
-        "cells": 4,
-        "mass_kg": 2.0,
-        "rotors": 4,
-        "labels": ["10x4.5", "15x5", "22x7.5", "32x11"],
+        "cells": 4, "mass_kg": 2.0, "rotors": 4, "labels": ["10x4.5", "15x5", "22x7.5", "32x11"],
         "kv": (100.0, 1200.0),
-    }
+    }  # fmt: skip
     best = choose(**ask, rest_kg=1.2).drop_duplicates("label").set_index("label")
     lifted = (best.at_N / 9.80665 - 0.001 * best.propulsion_g) * 4
     assert lifted.to_numpy() == pytest.approx(0.6 * 2.0)

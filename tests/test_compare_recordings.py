@@ -49,11 +49,8 @@ def stand(
     J = V / (n * D)
     CT, CQ = 0.11 * (n / 100.0) ** 0.04 * (1.0 - 0.9 * J - 0.4 * J**2), 0.008 * (1.0 - 0.1 * J - 0.7 * J**2)
     table = {
-        "rpm": n * 60.0,
-        "airspeed_m_s": V,
-        "thrust_N": CT * 1.2 * n**2 * D**4,
-        "torque_Nm": CQ * 1.2 * n**2 * D**5,
-    }
+        "rpm": n * 60.0, "airspeed_m_s": V, "thrust_N": CT * 1.2 * n**2 * D**4, "torque_Nm": CQ * 1.2 * n**2 * D**5,
+    }  # fmt: skip
     change(table)
     for name in ("thrust_N", "torque_Nm"):
         table[name] = table[name] * (1.0 + session * rng.standard_normal() + 0.004 * rng.standard_normal(17))
@@ -674,12 +671,8 @@ def test_a_rotor_that_has_just_set_off_is_no_misreading(tmp_path: Path) -> None:
         table["electrical_power_W"] = 20.0 + 1.4 * table["torque_Nm"] * table["rpm"] * np.pi / 30.0
         table["pulse_width_us"] = 1100.0 + 800.0 * (table["rpm"] - 3000.0) / 5000.0
         start = {
-            "rpm": 900.0,
-            "thrust_N": 0.01,
-            "torque_Nm": 1e-3,
-            "electrical_power_W": 40.0,
-            "pulse_width_us": 1250.0,
-        }
+            "rpm": 900.0, "thrust_N": 0.01, "torque_Nm": 1e-3, "electrical_power_W": 40.0, "pulse_width_us": 1250.0,
+        }  # fmt: skip
         files.append(written(tmp_path / name, {k: np.append(v, start.get(k, 0.0)) for k, v in table.items()}))
     assert not any("left out: no rotor" in note for note in compare(*files).document["notes"])
 

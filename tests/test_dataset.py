@@ -167,13 +167,10 @@ def test_nobody_can_write_to_a_dataset() -> None:
 
 def test_tables_go_out_and_come_back_the_same() -> None:
     d = Dataset(
-        "bench",
-        "stand",
-        {"rpm": [6000.0, 7000.0], "thrust_N": [10.0, 13.6]},
-        u_by={"random": {"thrust_N": 0.3}, "session": {"thrust_N": [0.4, 0.4]}},
-        flags=(("odd",), ()),
+        "bench", "stand", {"rpm": [6000.0, 7000.0], "thrust_N": [10.0, 13.6]},
+        u_by={"random": {"thrust_N": 0.3}, "session": {"thrust_N": [0.4, 0.4]}}, flags=(("odd",), ()),
         labels=("a:1", "a:2"),
-    )
+    )  # fmt: skip
     assert d.u["thrust_N"] == pytest.approx([0.5, 0.5])  # 3-4-5
     back = from_pandas(d.to_pandas(), "bench", "stand")
     assert back.labels == d.labels and back.flags == d.flags

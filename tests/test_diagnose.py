@@ -196,16 +196,8 @@ def test_the_document_keeps_its_schema() -> None:
     doc = json.loads(json.dumps(document.document(answer)))
     assert doc["schema"] == "bemt.diagnosis/1"
     assert {
-        "verdict",
-        "effects",
-        "ranking",
-        "location",
-        "fit",
-        "classes",
-        "next_measurement",
-        "p_value",
-        "explanation",
-    } <= set(doc)
+        "verdict", "effects", "ranking", "location", "fit", "classes", "next_measurement", "p_value", "explanation",
+    } <= set(doc)  # fmt: skip
     assert set(doc["location"]) >= {"channel", "variable", "low", "high", "size", "z"}
     assert all(
         set(f) >= {"before", "after", "noise", "gp_only", "holdout_before", "holdout_after"}

@@ -64,15 +64,8 @@ def test_a_sweep_takes_a_case_and_its_improved_one_beside_it(
     shutil.copytree(CASES / "prop_8x5", tmp_path / "prop_8x5")
     file = _recorded(tmp_path / "log.csv", 0)
     run = [
-        "diagnose",
-        file,
-        "--case",
-        str(tmp_path / "prop_8x5"),
-        "--off",
-        "compressibility",
-        "--no-figures",
-        "--quiet",
-    ]
+        "diagnose", file, "--case", str(tmp_path / "prop_8x5"), "--off", "compressibility", "--no-figures", "--quiet",
+    ]  # fmt: skip
     assert main([*run, "--out", str(tmp_path / "diagnosis")]) == 0
     assert main(["sweep", str(tmp_path), "--json"]) == 0
     names = [result["name"] for result in json.loads(capsys.readouterr().out)["cases"]]
@@ -368,22 +361,14 @@ def test_faults_of_all_files_and_the_case_are_said_at_once(tmp_path: Path, capsy
     assert main(["diagnose", str(bare), slow, windy, "--case", str(CASES / "prop_8x5"), "--quiet"]) == 2
     said = capsys.readouterr().err
     told = (
-        "column Drehzahl: got a speed",
-        "--unit Schub=UNIT",
-        "--unit Moment=UNIT",
-        "slow.csv: rpm: got no speed of rotation",
-        "windy.csv: airspeed_m_s: got thrust that is negative",
-    )
+        "column Drehzahl: got a speed", "--unit Schub=UNIT", "--unit Moment=UNIT",
+        "slow.csv: rpm: got no speed of rotation", "windy.csv: airspeed_m_s: got thrust that is negative",
+    )  # fmt: skip
     for words in told:
         assert words in said, said
     gone = [
-        "diagnose",
-        str(tmp_path / "gone.csv"),
-        "--case",
-        str(tmp_path / "no"),
-        "--reference",
-        str(tmp_path / "nor"),
-    ]
+        "diagnose", str(tmp_path / "gone.csv"), "--case", str(tmp_path / "no"), "--reference", str(tmp_path / "nor"),
+    ]  # fmt: skip
     assert main(gone) == 2
     said = capsys.readouterr().err
     assert all(f"{tmp_path / name}: got no such file" in said for name in ("gone.csv", "no", "nor")), said

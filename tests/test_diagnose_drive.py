@@ -34,11 +34,8 @@ def test_the_scatter_of_a_speed_follows_nothing(seed: int) -> None:
     share = (pulse - 0.001) / 0.001
     rpm = 24000.0 * share / (1.0 + 0.25 * share) * (1.0 + 0.001 * np.random.default_rng(seed).standard_normal(60))
     given = {
-        "rpm": rpm,
-        "airspeed_m_s": np.zeros(60),
-        "density_kg_m3": np.full(60, 1.225),
-        "time_s": 40.0 * np.arange(60),
-    }
+        "rpm": rpm, "airspeed_m_s": np.zeros(60), "density_kg_m3": np.full(60, 1.225), "time_s": 40.0 * np.arange(60),
+    }  # fmt: skip
     series = recording(case(), given, seed=seed)
     said = chain.diagnose([from_series(replace(series, values={**series.values, "pwm_s": pulse}), case())], [case()])
     assert said.systems["drive"]["verdict"] == "none"

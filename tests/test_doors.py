@@ -317,16 +317,12 @@ def test_the_drive_asks_the_same_rotor() -> None:
 
 
 OUTSIDE: Mapping[str, tuple[str, float, float, str]] = {
-    "J 70": ("10x5", 100.0, 30.0, "zero thrust"),
-    "Re 5,000": ("10x5", 430.0, 0.0, ""),
-    "Re 1,000": ("10x5", 86.0, 0.0, "Re "),
-    "4 in": ("4x2.5", 9000.0, 0.0, ""),
-    "28 in": ("28x9", 3000.0, 0.0, "diameter"),
-    "3 blades": ("8x4.5x3", 6000.0, 0.0, ""),
-    "6 blades": ("8x4.5x6", 6000.0, 0.0, "6 blades"),
-    "Mach 0.9": ("10x5", 23000.0, 0.0, "tip Mach"),
+    "J 70": ("10x5", 100.0, 30.0, "zero thrust"), "Re 5,000": ("10x5", 430.0, 0.0, ""),
+    "Re 1,000": ("10x5", 86.0, 0.0, "Re "), "4 in": ("4x2.5", 9000.0, 0.0, ""),
+    "28 in": ("28x9", 3000.0, 0.0, "diameter"), "3 blades": ("8x4.5x3", 6000.0, 0.0, ""),
+    "6 blades": ("8x4.5x6", 6000.0, 0.0, "6 blades"), "Mach 0.9": ("10x5", 23000.0, 0.0, "tip Mach"),
     "supersonic": ("10x5", 27000.0, 0.0, "supersonic"),
-}
+}  # fmt: skip
 """Label, rev/min, m/s and what is said, if anything."""
 
 

@@ -29,12 +29,9 @@ def made(pulse: np.ndarray, volts: np.ndarray | float = 12.0, noise: float = 0.0
     rng = np.random.default_rng(seed)
     thrust = 20.0 * share**1.7 * (volts / 12.0) ** 2 + noise * rng.standard_normal(len(pulse))
     values = {
-        "thrust_N": thrust,
-        "rpm": 9000.0 * share**0.85 * volts / 12.0,
-        "current_A": 30.0 * share**2.4,
-        "electrical_power_W": 30.0 * share**2.4 * volts,
-        "voltage_V": volts,
-    }
+        "thrust_N": thrust, "rpm": 9000.0 * share**0.85 * volts / 12.0, "current_A": 30.0 * share**2.4,
+        "electrical_power_W": 30.0 * share**2.4 * volts, "voltage_V": volts,
+    }  # fmt: skip
     return map_points(pulse, values)
 
 

@@ -69,13 +69,9 @@ def test_clean_trials_name_no_error(tmp_path: Path) -> None:
 
 
 PLANTED = [
-    ("back_emf.offset", 0.1),
-    ("back_emf.offset", -0.2),
-    ("torque.offset", 0.03),
-    ("torque.offset", -0.02),
-    ("torque.shunt", 1.04),
-    ("torque.shunt", 0.95),
-]
+    ("back_emf.offset", 0.1), ("back_emf.offset", -0.2), ("torque.offset", 0.03), ("torque.offset", -0.02),
+    ("torque.shunt", 1.04), ("torque.shunt", 0.95),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("name", "size"), PLANTED)

@@ -792,17 +792,9 @@ def test_a_scan_becomes_a_new_case_with_its_unknowns(
     export(propeller, None, tmp_path, ["stl"], name="found", unit="m", options=COARSE)
     out = tmp_path / "new"
     words = [
-        "new",
-        "mine",
-        "--scan",
-        str(tmp_path / "found.stl"),
-        "--rpm",
-        "7000",
-        "--airspeed-m-s",
-        "4",
-        "--out",
+        "new", "mine", "--scan", str(tmp_path / "found.stl"), "--rpm", "7000", "--airspeed-m-s", "4", "--out",
         str(out),
-    ]
+    ]  # fmt: skip
     assert main(words) == 0
     case = load_case(out)
     assert (case.name, case.rpm, case.airspeed_m_s, case.file.blade.known_from) == ("mine", 7000.0, 4.0, "scan")

@@ -18,10 +18,8 @@ from bemt.tools.cfd.schema import CampaignFile
 from bemt.tools.drive.motor_result import MotorToml
 
 MODELS: dict[str, type[Table]] = {
-    "campaign": CampaignFile,
-    "motor": MotorToml,
-    "recording": RecordingToml,
-}
+    "campaign": CampaignFile, "motor": MotorToml, "recording": RecordingToml,
+}  # fmt: skip
 Path_ = tuple[Any, ...]
 
 

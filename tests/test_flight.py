@@ -514,15 +514,7 @@ def test_recorded_thrust_in_moving_air(shared_data: Path) -> None:
     assert abs(flow.axial[0] - (top[1] / top[0] - 1.0)) < flow.axial[1] < 0.01
 
 
-@pytest.mark.parametrize(
-    ("name", "speed"),
-    [
-        ("35wind", 4.2),
-        ("70wind", 8.5),
-        ("100wind", 12.1),
-        ("70p20sint", 8.5),
-    ],
-)
+@pytest.mark.parametrize(("name", "speed"), [("35wind", 4.2), ("70wind", 8.5), ("100wind", 12.1), ("70p20sint", 8.5)])
 def test_recorded_wind(shared_data: Path, name: str, speed: float) -> None:
     """Within 2 m/s and the band, in steady wind and in gusts at the frequency of the flight."""
     folder = shared_data / "flight_logs" / "neural_fly"

@@ -388,14 +388,9 @@ TABLE_23012 = """
 90.0 1.68 -1.23
 """
 SHAPES = {
-    "0012": naca("0012"),
-    "4412": naca("4412"),
-    "23012": naca("23012"),
-    "23112": naca("23112"),
-    "closed": naca4(0.03, 0.45, 0.09, te_gap=0.0),
-    "plate": plate(0.06, 0.03),
-    "negative": naca4(-0.04, 0.4, 0.12),
-}
+    "0012": naca("0012"), "4412": naca("4412"), "23012": naca("23012"), "23112": naca("23112"),
+    "closed": naca4(0.03, 0.45, 0.09, te_gap=0.0), "plate": plate(0.06, 0.03), "negative": naca4(-0.04, 0.4, 0.12),
+}  # fmt: skip
 shapes = pytest.mark.parametrize("section", SHAPES.values(), ids=SHAPES.keys())
 cambers = st.floats(-0.12, 0.12).map(lambda v: round(v, 4))
 positions = st.floats(0.2, 0.7)
@@ -541,17 +536,13 @@ def lednicer(section: Airfoil, counts: bool) -> str:
 @pytest.mark.parametrize(
     "write",
     [
-        dat,
-        lambda s: dat(s).replace("\n", "\r\n"),
-        lambda s: "\ufeff" + dat(s).replace(" ", ",  "),
-        lambda s: "\n".join(dat(s).splitlines()[1:]),
-        lambda s: "23012\n" + "\n".join(dat(s).splitlines()[1:]),
-        lambda s: "title\n" + "\n".join(reversed(dat(s).splitlines()[1:])),
-        lambda s: lednicer(s, True),
+        dat, lambda s: dat(s).replace("\n", "\r\n"), lambda s: "\ufeff" + dat(s).replace(" ", ",  "),
+        lambda s: "\n".join(dat(s).splitlines()[1:]), lambda s: "23012\n" + "\n".join(dat(s).splitlines()[1:]),
+        lambda s: "title\n" + "\n".join(reversed(dat(s).splitlines()[1:])), lambda s: lednicer(s, True),
         lambda s: lednicer(s, False),
     ],
     ids=["selig", "crlf", "bom, commas", "no title", "number title", "lower first", "lednicer", "lednicer, no counts"],
-)
+)  # fmt: skip
 def test_files_come_back(section: Airfoil, write) -> None:  # type: ignore[no-untyped-def]
     back = parse_dat(write(section), "name")
     assert back.name == "name"

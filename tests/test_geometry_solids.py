@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import math
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
 
 from bemt.rotors.case import load_case
 from geometry.airfoil import naca4
+from geometry.cad import planar_sections, solids, tessellate
 from geometry.common import GeometryError
 from geometry.duct import Duct, Stator, around
+from geometry.export import export
 from geometry.laws import from_laws, helix
 from geometry.mesh import MeshModel, Options, build, rotor_mesh, surfaces
 from geometry.rotor import Rotor, from_stations
@@ -42,13 +46,9 @@ def random_rotor(rng: np.random.Generator) -> tuple[Rotor, Duct | None]:
         return rotor, None
     stator = Stator(int(rng.integers(3, 8)), 0.12 * diameter) if rng.random() < 0.5 else None
     duct = around(
-        rotor,
-        float(rng.uniform(0.4, 1.0)) * diameter,
-        float(rng.uniform(0.003, 0.03)) * rotor.R,
-        float(rng.uniform(0.01, 0.08)) * rotor.R,
-        exit_area_ratio=float(rng.uniform(0.8, 1.2)),
-        stator=stator,
-    )
+        rotor, float(rng.uniform(0.4, 1.0)) * diameter, float(rng.uniform(0.003, 0.03)) * rotor.R,
+        float(rng.uniform(0.01, 0.08)) * rotor.R, exit_area_ratio=float(rng.uniform(0.8, 1.2)), stator=stator,
+    )  # fmt: skip
     return rotor, duct
 
 
@@ -261,15 +261,19 @@ def test_what_cannot_be_made_can_be_looked_at(hub: float, blades: int) -> None:
 # The promise of the CAD solids: the same volume as mesh and sections, STEP that comes back, a reason for refusals.
 
 
-try:
-    import cadquery as cq
-except ImportError as error:  # pragma: no cover - where the system's graphics libraries are missing
-    pytest.skip(f"cadquery cannot be loaded (it needs libGL, libX11 and libexpat): {error}", allow_module_level=True)
+@pytest.fixture(scope="module")
+def cq() -> ModuleType:
+    """The CAD kernel, which takes seconds to load."""
+    try:
+        return importlib.import_module("cadquery")
+    except ImportError as error:  # pragma: no cover - where the system's graphics libraries are missing
+        pytest.skip(f"cadquery cannot be loaded (it needs libGL, libX11 and libexpat): {error}")
 
-from geometry.cad import planar_sections, solids, tessellate  # noqa: E402
-from geometry.export import export  # noqa: E402
+
+CAD = pytest.mark.usefixtures("cq")
 
 
+@CAD
 @pytest.mark.parametrize("name", ["prop_8x5", pytest.param("prop_10x5", marks=pytest.mark.slow),
                                   pytest.param("prop_12x6", marks=pytest.mark.slow),
                                   pytest.param("prop_14x8", marks=pytest.mark.slow), "ds30"])  # fmt: skip
@@ -289,6 +293,7 @@ def test_cad_mesh_and_sections_have_one_volume(name: str, project: Path) -> None
     assert tip / 1000 == pytest.approx(rotor.R, rel=1e-6)
 
 
+@CAD
 def test_planar_sections_lie_on_the_wrapped_blade() -> None:
     section = naca4(0.03, 0.4, 0.1)
     rotor = Rotor(from_stations([0.03, 0.1], [0.015] * 2, [0.5] * 2, 0.1, 0.03, section), 4)
@@ -300,7 +305,7 @@ def test_planar_sections_lie_on_the_wrapped_blade() -> None:
             assert points[:, 1] == pytest.approx(curve[:, 1], abs=2e-6)
 
 
-def test_tessellation_follows_its_tolerance_and_old_triangles() -> None:
+def test_tessellation_follows_its_tolerance_and_old_triangles(cq: ModuleType) -> None:
     shape = cq.Workplane().sphere(10.0).val()
     volumes = [tessellate(shape, tolerance, 1.0).volume for tolerance in (1e-3, 1e-5, 1e-3)]
     exact = 4 / 3 * np.pi * 0.01**3
@@ -308,6 +313,7 @@ def test_tessellation_follows_its_tolerance_and_old_triangles() -> None:
     assert volumes[0] < volumes[1] and volumes[2] == pytest.approx(volumes[0], rel=1e-9)
 
 
+@CAD
 def test_what_makes_no_cad_solid_is_refused_with_the_reason() -> None:
     with pytest.raises(GeometryError, match="anchors: got none"):
         solids(Rotor(helix(0.2, 0.1), 2))
@@ -317,7 +323,7 @@ def test_what_makes_no_cad_solid_is_refused_with_the_reason() -> None:
 
 
 @pytest.fixture(scope="module")
-def small_fan(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, set[str]]]:
+def small_fan(cq: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, set[str]]]:
     """STEP of the parts and of the air around a fan of two blades and two vanes, with the names of their faces."""
     rotor = Rotor(helix(0.1, 0.1, "fan", hub=0.35, anchors=naca4(0.04, 0.4, 0.1)), 2)
     duct = around(rotor, 0.07, 0.0008, 0.005, exit_area_ratio=0.95, exit_hub_radius=0.01, stator=Stator(2, 0.02))
@@ -340,6 +346,7 @@ def test_every_face_of_a_step_has_the_name_of_its_boundary(small_fan: tuple[Path
     assert written.count("far_field_side") == 4 and written.count("far_field_inlet") == 1
 
 
+@CAD
 def test_the_zone_that_turns_holds_the_rotor_and_no_vane(tmp_path: Path) -> None:
     from geometry.cad import rotating_zone
 
@@ -366,6 +373,7 @@ def test_the_zone_that_turns_holds_the_rotor_and_no_vane(tmp_path: Path) -> None
     assert closed.volume == pytest.approx(solid.Volume(), rel=2e-3)
 
 
+@CAD
 def test_the_far_field_is_as_wide_as_stated(tmp_path: Path) -> None:
     rotor = Rotor(helix(0.1, 0.1, "fan", hub=0.35, anchors=naca4(0.04, 0.4, 0.1)), 2)
     (made,) = export(rotor, None, tmp_path, ["flow"], name="fan", box=20.0)["files"]
@@ -373,6 +381,7 @@ def test_the_far_field_is_as_wide_as_stated(tmp_path: Path) -> None:
     assert made["surfaces"][0]["volume_m3"] == pytest.approx(box, rel=1e-3)
 
 
+@CAD
 def test_no_vane_stands_on_a_seam() -> None:
     """A vane whose edges lie on the seams of duct and body left no air at all: fans of 70 and 254 mm."""
     rotor = Rotor(helix(0.07, 0.1, "fan", hub=0.35, anchors=naca4(0.04, 0.4, 0.1)), 2)
@@ -384,6 +393,7 @@ def test_no_vane_stands_on_a_seam() -> None:
         assert len(off_axis) and (np.cos(copies * np.arctan2(off_axis[:, 1], off_axis[:, 0])) < -0.99).all()
 
 
+@CAD
 def test_a_failure_of_the_kernel_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def nothing(*_: object) -> None:
         raise ValueError("Null TopoDS_Shape object")

@@ -331,12 +331,7 @@ def known(tree: dict[str, str]) -> set[str]:
 
 
 def test_the_tree_keeps_the_rules(tree: dict[str, str]) -> None:
-    assert {
-        "bemt.app.cli",
-        "bemt.physics.bem.solver",
-        "bemt.physics.effects.tip_loss",
-        "geometry.rotor",
-    } <= set(tree)
+    assert {"bemt.app.cli", "bemt.physics.bem.solver", "bemt.physics.effects.tip_loss", "geometry.rotor"} <= set(tree)
     assert not violations(tree), "\n".join(violations(tree))
 
 

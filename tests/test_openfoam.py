@@ -417,12 +417,9 @@ def grid_stops(start: float, end: float, parts: list[tuple[float, int, float]]) 
 
 
 @given(
-    kind=st.sampled_from(sorted(KINDS)),
-    level=st.floats(4.0, 9.0),
-    R=st.floats(0.02, 2.0),
-    deep=st.floats(0.05, 1.5),
+    kind=st.sampled_from(sorted(KINDS)), level=st.floats(4.0, 9.0), R=st.floats(0.02, 2.0), deep=st.floats(0.05, 1.5),
     hub=st.floats(0.1, 0.5),
-)
+)  # fmt: skip
 def test_the_rotating_zone_ends_on_the_base_grid(kind: str, level: float, R: float, deep: float, hub: float) -> None:
     """Else the two periodic sides are cut differently and make mass. Read from the text that OpenFOAM gets."""
     change = dict(KINDS[kind])

@@ -428,12 +428,8 @@ def check(form: str, raw: bytes, kind: str, path: Path, truth: dict[str, Dataset
                 continue
             strange = set(values[np.isfinite(values)]) - set(known[name])
             assert not strange or any("may be cut" in w for w in spoken), (
-                form,
-                kind,
-                name,
-                sorted(strange)[:5],
-                record.notes,
-            )
+                form, kind, name, sorted(strange)[:5], record.notes,
+            )  # fmt: skip
     return "read"
 
 

@@ -96,11 +96,7 @@ def same_data(p: Polar, Re: float, M: float = 0.0, alpha: np.ndarray = ALPHA, la
 
 
 FULL = np.r_[np.arange(-180.0, -20.0, 20.0), np.arange(-16.0, 17.0, 2.0), np.arange(20.0, 181.0, 20.0)]
-SAMPLES = {
-    "polar_csv": csv([5e4, 2e5]),
-    "polar_xfoil": xfoil(),
-    "polar_c81": c81(ALPHA, np.array([0.0, 0.3, 0.6])),
-}
+SAMPLES = {"polar_csv": csv([5e4, 2e5]), "polar_xfoil": xfoil(), "polar_c81": c81(ALPHA, np.array([0.0, 0.3, 0.6]))}
 
 
 @pytest.mark.parametrize("kind", sorted(SAMPLES))

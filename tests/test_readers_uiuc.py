@@ -39,28 +39,18 @@ def write(folder: Path, **files: str) -> Path:
 @pytest.mark.parametrize(
     ("stem", "diameter", "pitch", "blades"),
     [
-        ("apce_10x5_geom", 10.0, 5.0, 2),
-        ("apccf_7.4x8.25_static_2883cm", 7.4, 8.25, 2),
-        ("apce_17x12_jb1092e_2000", 17.0, 12.0, 2),
-        ("zin_11x7_3011TG_5016", 11.0, 7.0, 2),
-        ("vp_140x45_0591rd_4991", 140 / 25.4, 45 / 25.4, 2),
-        ("pl_57x20_geom", 57 / 25.4, 20 / 25.4, 2),
-        ("pl_100x80_static_0581rd", 100 / 25.4, 80 / 25.4, 2),
-        ("kpf_96x70_geom", 96 / 25.4, 70 / 25.4, 2),
-        ("pl_triturbo_static_0566rd", 2.55, None, 2),
-        ("union_u80_geom", 3.15, None, 2),
-        ("cfnq_45p2_static_1323rd", 1.85, None, 2),
-        ("mit_5x4_0363rd_3032", 5.0, 4.0, 3),
-        ("da4022_9x6.75_4b_1086ga_2034", 9.0, 6.75, 4),
-        ("ancf_125x75_static_0914od", 12.5, 7.5, 2),
-        ("ancf_125x6_0925od_3027", 12.5, 6.0, 2),
-        ("ancf_12x65_static_0806od", 12.0, 6.5, 2),
-        ("ancf_12x13_0784od_4015", 12.0, 13.0, 2),
-        ("ancf_11x10_geom", 11.0, 10.0, 2),
-        ("apce_19x12_geom", 19.0, 12.0, 2),
-        ("apcr-rh_9x4.5_0678rd_4000", 9.0, 4.5, 2),
+        ("apce_10x5_geom", 10.0, 5.0, 2), ("apccf_7.4x8.25_static_2883cm", 7.4, 8.25, 2),
+        ("apce_17x12_jb1092e_2000", 17.0, 12.0, 2), ("zin_11x7_3011TG_5016", 11.0, 7.0, 2),
+        ("vp_140x45_0591rd_4991", 140 / 25.4, 45 / 25.4, 2), ("pl_57x20_geom", 57 / 25.4, 20 / 25.4, 2),
+        ("pl_100x80_static_0581rd", 100 / 25.4, 80 / 25.4, 2), ("kpf_96x70_geom", 96 / 25.4, 70 / 25.4, 2),
+        ("pl_triturbo_static_0566rd", 2.55, None, 2), ("union_u80_geom", 3.15, None, 2),
+        ("cfnq_45p2_static_1323rd", 1.85, None, 2), ("mit_5x4_0363rd_3032", 5.0, 4.0, 3),
+        ("da4022_9x6.75_4b_1086ga_2034", 9.0, 6.75, 4), ("ancf_125x75_static_0914od", 12.5, 7.5, 2),
+        ("ancf_125x6_0925od_3027", 12.5, 6.0, 2), ("ancf_12x65_static_0806od", 12.0, 6.5, 2),
+        ("ancf_12x13_0784od_4015", 12.0, 13.0, 2), ("ancf_11x10_geom", 11.0, 10.0, 2),
+        ("apce_19x12_geom", 19.0, 12.0, 2), ("apcr-rh_9x4.5_0678rd_4000", 9.0, 4.5, 2),
     ],
-)
+)  # fmt: skip
 def test_sizes_from_names(stem: str, diameter: float, pitch: float | None, blades: int) -> None:
     file = parse_file_name(stem)
     assert file is not None and not file.propeller.faults

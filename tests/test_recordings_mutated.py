@@ -40,14 +40,9 @@ def log_text(rows: int = 60, mark: str = ",") -> str:
         level = (0, 1, 2, 0)[4 * k // rows]
         rpm = 3000.0 * level + (k % 3 if level else 0)
         cells = [
-            0.02 * k,
-            1000 + 300 * level,
-            rpm,
-            2e-7 * rpm**2 + 0.01 * (k % 5),
-            3e-9 * rpm**2,
-            15.0 - level,
+            0.02 * k, 1000 + 300 * level, rpm, 2e-7 * rpm**2 + 0.01 * (k % 5), 3e-9 * rpm**2, 15.0 - level,
             4.0 * level,
-        ]
+        ]  # fmt: skip
         out.append(mark.join(f"{c:.6g}" for c in cells))
     return "\n".join(out) + "\n"
 

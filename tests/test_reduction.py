@@ -33,13 +33,9 @@ K_T, K_Q = 2.0e-7, 3.0e-9
 def recording(values: dict[str, np.ndarray], **more: object) -> Dataset:
     lines = range(2, len(next(iter(values.values()))) + 2)
     return Dataset(
-        "bench",
-        "table",
-        values,
-        lines=lines,
-        units={"humidity": "-", "electrical_rpm": "rpm", "optical_rpm": "rpm"},
+        "bench", "table", values, lines=lines, units={"humidity": "-", "electrical_rpm": "rpm", "optical_rpm": "rpm"},
         **more,
-    )
+    )  # fmt: skip
 
 
 def noise(rng: np.random.Generator, n: int, sd: float, r: float = 0.0) -> np.ndarray:

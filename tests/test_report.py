@@ -24,6 +24,7 @@ from urllib.parse import unquote
 
 import numpy as np
 import pytest
+from made_case import make_case
 
 from bemt.app.cli import main
 from bemt.base.page import render
@@ -38,56 +39,18 @@ from bemt.results.sweep.rows import Comparison, Result, Row
 from bemt.tools.cfd.report import attach, cfd_runs, operating_run, report_pages
 from geometry.mesh import Surface
 
-CASE = """
-schema = "bemt.case/1"
-name = "{name}"
-title = "{title}"
-references = "references.csv"
-[rotor]
-kind = "propeller"
-blades = 2
-diameter_in = 10
-hub_ratio = 0.15
-[blade]
-pitch_in = 5
-chord_law = "apc_like"
-max_chord_over_R = 0.2
-[blade.section]
-naca = "4412"
-[[polars]]
-file = "polar.csv"
-r_over_R = 0.75
-[operating]
-rpm = 6000
-[air]
-density_kg_m3 = 1.2
-[model]
-stations = 20
-[[assumptions]]
-key = "blade.max_chord_over_R"
-low = 0.18
-high = 0.22
-why = "made for a test"
-"""
 EVIL = "<script>window.pwned=1</script><img src=x onerror=window.pwned=1>\"'`]]>--><svg onload=window.pwned=1>"
 
 
 def write_case(folder: Path, name: str, title: str, remark: str, bench_u: str = "0.01") -> Path:
-    """Write a case with its own section table, so that no network of sections is loaded."""
-    here = folder / name
-    here.mkdir(parents=True)
-    alpha = np.arange(-20.0, 21.0)
-    cl = np.clip(0.1 * (alpha + 4.0), -0.9, 1.3)
-    rows = [f"{a:g},{c:.5f},{0.012 + 0.008 * c * c:.5f}" for a, c in zip(alpha, cl, strict=True)]
-    (here / "polar.csv").write_text("alpha_deg,cl,cd\n" + "\n".join(rows) + "\n")
+    """Folder of a case that has a title, with a remark on a reference."""
     quoted = remark.replace('"', '""')
-    (here / "references.csv").write_text(
+    references = (
         "quantity,value,unit,uncertainty,kind,source,remark,rpm,airspeed_m_s,density_kg_m3\n"
         f'thrust,0.5,kgf,{bench_u},bench,"{quoted[:300]}",,6000,0,1.2\n'
         f'thrust,0.62,kgf,unknown,cfd,solver,"{quoted}",6000,0,1.2\n'
     )
-    (here / "case.toml").write_text(CASE.replace("{name}", name).replace("{title}", title))
-    return here
+    return make_case(folder, name, references=references, title=title).parent
 
 
 @pytest.fixture(scope="module")
@@ -144,50 +107,11 @@ def tables(page: str) -> list[list[list[str]]]:
 
 
 TAGS = {
-    "html",
-    "head",
-    "meta",
-    "link",
-    "title",
-    "style",
-    "body",
-    "header",
-    "h1",
-    "h2",
-    "h3",
-    "p",
-    "nav",
-    "ul",
-    "li",
-    "a",
-    "main",
-    "section",
-    "article",
-    "div",
-    "span",
-    "strong",
-    "code",
-    "img",
-    "figure",
-    "figcaption",
-    "svg",
-    "path",
-    "g",
-    "text",
-    "circle",
-    "canvas",
-    "button",
-    "details",
-    "summary",
-    "table",
-    "thead",
-    "tbody",
-    "tr",
-    "th",
-    "td",
-    "footer",
+    "html", "head", "meta", "link", "title", "style", "body", "header", "h1", "h2", "h3", "p", "nav", "ul", "li", "a",
+    "main", "section", "article", "div", "span", "strong", "code", "img", "figure", "figcaption", "svg", "path", "g",
+    "text", "circle", "canvas", "button", "details", "summary", "table", "thead", "tbody", "tr", "th", "td", "footer",
     "script",
-}
+}  # fmt: skip
 
 
 def assert_harmless(page: str) -> None:
@@ -622,20 +546,10 @@ class Browser:
         to_read, self.write = os.pipe()
         self.read, to_write = os.pipe()
         flags = [
-            "--headless",
-            "--no-sandbox",
-            "--disable-gpu",
-            "--enable-unsafe-swiftshader",
-            "--disable-quic",
-            "--no-first-run",
-            "--disable-sync",
-            "--disable-background-networking",
-            "--disable-component-update",
-            "--disable-dev-shm-usage",
-            "--remote-debugging-pipe",
-            f"--user-data-dir={profile}",
-            "about:blank",
-        ]
+            "--headless", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-quic",
+            "--no-first-run", "--disable-sync", "--disable-background-networking", "--disable-component-update",
+            "--disable-dev-shm-usage", "--remote-debugging-pipe", f"--user-data-dir={profile}", "about:blank",
+        ]  # fmt: skip
         self.process = subprocess.Popen(
             [sys.executable, "-c", RELAY, str(to_read), str(to_write), program, *flags],
             pass_fds=(to_read, to_write),

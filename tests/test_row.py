@@ -67,29 +67,10 @@ def bake(solidity: float, stagger: float, polar: Polar, sections: tuple[tuple[fl
     zero, slope = zero_and_slope(ALPHA_GRID, cl[:, 0])
     one, none = np.ones(1), np.zeros(1)
     return RotorBuild(
-        r=one,
-        dr=one,
-        chord=one,
-        beta=one * (0.5 * np.pi - stagger),
-        sigma=one * solidity,
-        R=1.0,
-        Rhub=0.2,
-        B=8,
-        alpha=ALPHA_GRID,
-        Re=Re,
-        M2=none,
-        cl=cl,
-        cd=cd,
-        alpha0=zero,
-        cla=slope,
-        Vx_factor=one,
-        Vy_factor=one,
-        Vx_add=none,
-        Vy_add=none,
-        thickness=one * 0.1,
-        own_mach=none,
-        sections=sections,
-    )
+        r=one, dr=one, chord=one, beta=one * (0.5 * np.pi - stagger), sigma=one * solidity, R=1.0, Rhub=0.2, B=8,
+        alpha=ALPHA_GRID, Re=Re, M2=none, cl=cl, cd=cd, alpha0=zero, cla=slope, Vx_factor=one, Vy_factor=one,
+        Vx_add=none, Vy_add=none, thickness=one * 0.1, own_mach=none, sections=sections,
+    )  # fmt: skip
 
 
 def lift_ahead(

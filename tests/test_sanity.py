@@ -67,18 +67,15 @@ def test_a_clean_recording_has_no_findings(diameter: float, told: bool) -> None:
 SLIPS = [
     ("thrust_N", 1 / KGF, "thrust_unit", "kgf taken for N"),
     ("thrust_N", 1000 / KGF, "thrust_unit", "gf taken for N"),
-    ("thrust_N", 1 / LBF, "thrust_unit", "lbf taken for N"),
-    ("thrust_N", KGF, "thrust_unit", "N taken for kgf"),
-    ("thrust_N", 1000.0, "thrust_unit", "gf taken for kgf"),
-    ("thrust_N", 1e-3, "thrust_unit", "kgf taken for gf"),
+    ("thrust_N", 1 / LBF, "thrust_unit", "lbf taken for N"), ("thrust_N", KGF, "thrust_unit", "N taken for kgf"),
+    ("thrust_N", 1000.0, "thrust_unit", "gf taken for kgf"), ("thrust_N", 1e-3, "thrust_unit", "kgf taken for gf"),
     ("torque_Nm", 1000.0, "torque_unit", "mNm taken for Nm"),
     ("torque_Nm", 100 / KGF, "torque_unit", "kgf cm taken for Nm"),
     ("torque_Nm", 1 / (LBF * INCH), "torque_unit", "lbf in taken for Nm"),
-    ("rpm", 7.0, "rpm_electrical", "7 pole pairs"),
-    ("rpm", 14.0, "rpm_electrical", "14 pole pairs"),
+    ("rpm", 7.0, "rpm_electrical", "7 pole pairs"), ("rpm", 14.0, "rpm_electrical", "14 pole pairs"),
     ("rpm", units.RPM, "rpm_unit", "rad/s taken for rev/min"),
     ("rpm", 1 / 60, "rpm_unit", "rev/s (Hz) taken for rev/min"),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("pitch", [None, 6 * INCH])
@@ -429,12 +426,9 @@ SIZE = {DUALSKY: (10 * INCH, 6 * INCH), MN2206: (6 * INCH, 3.5 * INCH), TMOTOR: 
 THRUST = {STEPS: "Thrust (gf)", LOG: "Thrust (gf)", DUALSKY: "th", MN2206: "th", TMOTOR: "T(gf)"}
 TORQUE = {STEPS: "Torque (N·m)", LOG: "Torque (N·m)", DUALSKY: "tq", MN2206: "tq", TMOTOR: "Q(Nm)"}
 SPEED = {
-    STEPS: "Motor Electrical Speed (RPM)",
-    LOG: "Motor Electrical Speed (RPM)",
-    DUALSKY: "rpm",
-    MN2206: "rpm",
+    STEPS: "Motor Electrical Speed (RPM)", LOG: "Motor Electrical Speed (RPM)", DUALSKY: "rpm", MN2206: "rpm",
     TMOTOR: "RPM",
-}
+}  # fmt: skip
 CURRENT = {STEPS: "Current (A)", DUALSKY: "a", LOG: "Current (A)"}
 TIME = {STEPS: "Time (s)", LOG: "Time (s)", XNOVA: "Time (s)"}
 SAME_AS = {TMOTOR: {"T(gf)": ("T(N)",)}}

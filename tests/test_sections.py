@@ -97,12 +97,9 @@ def test_zero_lift_is_the_crossing_nearest_to_the_chord_line() -> None:
 def test_bad_tables_are_refused() -> None:
     good = P.linear_polar()
     bad = {
-        "cd": good.cd * 0.0,
-        "cl": np.where(good.alpha[:, None, None] > 3.1, 1.0, good.cl),
-        "alpha": good.alpha[::-1],
-        "Re": good.Re[:3],
-        "confidence": np.zeros(3),
-    }
+        "cd": good.cd * 0.0, "cl": np.where(good.alpha[:, None, None] > 3.1, 1.0, good.cl), "alpha": good.alpha[::-1],
+        "Re": good.Re[:3], "confidence": np.zeros(3),
+    }  # fmt: skip
     for field, value in bad.items():
         parts = {f: getattr(good, f) for f in ("alpha", "Re", "M", "cl", "cd")} | {field: value}
         with pytest.raises(ValueError, match="expected"):
@@ -148,13 +145,9 @@ def test_linear_polar_is_ideal() -> None:
 
 
 SECTIONS = {
-    "0012": naca("0012"),
-    "4412": naca("4412"),
-    "2415": naca("2415"),
-    "thin": naca4(0.04, 0.4, 0.06),
-    "sharp": naca4(0.06, 0.4, 0.04),
-    "23015": naca("23015"),
-}
+    "0012": naca("0012"), "4412": naca("4412"), "2415": naca("2415"), "thin": naca4(0.04, 0.4, 0.06),
+    "sharp": naca4(0.06, 0.4, 0.04), "23015": naca("23015"),
+}  # fmt: skip
 # as outlines: NeuralFoil itself is asked, not the shipped table of its answers
 SECTIONS = {name: dataclasses.replace(shape, four_digit=None) for name, shape in SECTIONS.items()}
 

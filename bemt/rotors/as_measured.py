@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from bemt.base import unit_errors
 from bemt.base.arrays import Array
+from bemt.base.cache import Kept, content_key
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_text
 from bemt.physics import coefficients as co
@@ -22,6 +24,7 @@ from bemt.rotors.predict import sense
 
 if TYPE_CHECKING:
     from bemt.physics.air import Air
+    from bemt.physics.bem.model import Model
     from bemt.rotors.case import Case
 
 # Advance ratio below which a point is at rest [1].
@@ -54,26 +57,24 @@ class AsMeasured:
     @property
     def told(self) -> str:
         """How large the run's loads are."""
-        return " and ".join(f"{word} {number_text(ratio, 3)} times" for word, ratio in self.times.items())
+        return _told(self.times)
 
-    def check(self, where: str) -> None:
-        """Refuse loads that no blade of the case's label has: they would move nothing, as if they agreed."""
-        word, ratio = next(iter(self.times.items()), ("", 1.0))
-        if 1.0 / FACTOR < abs(ratio) < FACTOR or self.far < FAR:
-            return
-        slips = [(e.factor, e.rarity, e.words) for e in unit_errors.errors(word.replace("thrust", "force"))]
-        slips += [(r.ratio**-2, r.rarity, f"speed: {r.words}") for r in unit_errors.speed_ratios()]
-        near = min(slips, key=lambda s: (math.log(max(abs(ratio), 1e-12) / s[0]) / 0.25) ** 2 + s[1])
-        hint = f"Look at units, speed, diameter and pitch. The nearest slip is {near[2]}"
-        raise InputError(
-            Fault(
-                where,
-                "",
-                f"{self.told} what the case gives",
-                f"loads of this rotor, within a factor of {FACTOR:g}",
-                hint,
-            )
-        )
+
+def _told(times: Mapping[str, float]) -> str:
+    return " and ".join(f"{word} {number_text(ratio, 3)} times" for word, ratio in times.items())
+
+
+def _check(where: str, times: Mapping[str, float], far: float) -> None:
+    """Refuse loads that no blade of the case's label has: they would move nothing, as if they agreed."""
+    word, ratio = next(iter(times.items()), ("", 1.0))
+    if 1.0 / FACTOR < abs(ratio) < FACTOR or far < FAR:
+        return
+    slips = [(e.factor, e.rarity, e.words) for e in unit_errors.errors(word.replace("thrust", "force"))]
+    slips += [(r.ratio**-2, r.rarity, f"speed: {r.words}") for r in unit_errors.speed_ratios()]
+    near = min(slips, key=lambda s: (math.log(max(abs(ratio), 1e-12) / s[0]) / 0.25) ** 2 + s[1])
+    got, expected = f"{_told(times)} what the case gives", f"loads of this rotor, within a factor of {FACTOR:g}"
+    hint = f"Look at units, speed, diameter and pitch. The nearest slip is {near[2]}"
+    raise InputError(Fault(where, "", got, expected, hint))
 
 
 def _groups(rpm: Array, J: Array) -> list[NDArray[np.intp]]:
@@ -86,20 +87,39 @@ def as_measured(
     case: Case, rpm: Array, airspeed_m_s: Array, air: Air, CT: Array, CP: Array,
     u_CT: Array | float = 0.0, u_CP: Array | float = 0.0, gain: tuple[float, float] = (SESSION, SESSION),
     others: Array | None = None, theirs: NDArray[np.bool_] | None = None,
-    prior: Prior | None = None,
+    prior: Prior | None = None, where: str | None = None,
 ) -> AsMeasured:  # fmt: skip
     """Posterior of a rotor's latent numbers from a reference run.
 
     ``others`` as in `noise_of_run`, for the points ``theirs`` that another piece or campaign gave, (P,); all of them
-    where that is not said.  ``prior``: what is known before, as the case says by default.
+    where that is not said.  ``prior``: what is known before, as the case says by default.  ``where`` names readings
+    that are refused, with InputError and before the search, where no blade of the label has such loads.
     """
     from bemt.rotors.case.prepare import prepare_case
 
-    people = population()
     if prior is None:
         prior = case.as_built().prior
         prior = prior if prior.known_from == "reference" else case.as_built(counting_assumptions=False).prior
-    ready = prepare_case(case)
+    ready, fields = prepare_case(case), air_fields(air)
+    given = content_key(rpm, airspeed_m_s, CT, CP, *map(np.asarray, (u_CT, u_CP, gain)), *fields.values(),
+                        *(np.zeros(0) if v is None else v for v in (others, theirs)), prior.known_from,
+                        prior.mean, prior.cov, prior.sizes, prior.weights)  # fmt: skip
+    return _MEASURED.get((ready.key, given, where is None, population()), lambda: _searched(
+        ready, prior, rpm, airspeed_m_s, fields, CT, CP, u_CT, u_CP, gain, others, theirs, where,
+    ))  # fmt: skip
+
+
+_MEASURED: Kept[AsMeasured] = Kept(64, lambda _: 1.0)
+"""Rotors of this process by model and readings: many questions are asked of one."""
+
+
+def _searched(
+    ready: Model, prior: Prior, rpm: Array, airspeed_m_s: Array, fields: Mapping[str, Array], CT: Array, CP: Array,
+    u_CT: Array | float, u_CP: Array | float, gain: tuple[float, float], others: Array | None,
+    theirs: NDArray[np.bool_] | None, where: str | None,
+) -> AsMeasured:  # fmt: skip
+    """Posterior of :func:`as_measured`."""
+    people = population()
     J = airspeed_m_s / (rpm / 60.0 * ready.diameter_m)
     usable = np.isfinite(CT) | np.isfinite(CP)
     if not usable.any():
@@ -113,7 +133,7 @@ def as_measured(
 
     foreign = None if theirs is None else mean(theirs.astype(np.float64)) > 0.5
     share = np.array([1.0 / np.sqrt(g.size) for g in groups])
-    state = air_of_points({k: v if v.size == 1 else mean(v) for k, v in air_fields(air).items()})
+    state = air_of_points({k: v if v.size == 1 else mean(v) for k, v in fields.items()})
     rpm_, J_ = mean(rpm), mean(J)
     solve = coefficients(ready, state)
     points = np.arange(rpm_.size)
@@ -139,6 +159,8 @@ def as_measured(
     off = target - at.f.reshape(-1) - bias
     far = float(np.max(np.abs(_off_by(prior, at, off, noise, mine)), initial=0.0))
     thirst = float(np.max(_off_by(prior, at, off, noise, rows["torque"]), initial=0.0))
+    if where is not None:
+        _check(where, times, far)
     z, settled, passes = prior.mean, False, 0
     while passes < MOST_PASSES and not settled:
         passes += 1

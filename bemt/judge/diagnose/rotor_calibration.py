@@ -70,9 +70,7 @@ def learn(
     gains: tuple[float, float],
 ) -> AsMeasured:  # fmt: skip
     """Condition the rotor of a case on thrust and torque coefficients ``y`` with uncertainties ``u``, two (P,) each."""
-    found = as_measured(case, rpm, V, air, y[0], y[1], u[0], u[1], gains)
-    found.check(", ".join(paths))
-    return found
+    return as_measured(case, rpm, V, air, y[0], y[1], u[0], u[1], gains, where=", ".join(paths))
 
 
 def write(

@@ -46,9 +46,10 @@ HUB_LOADS = ("H_force_N", "Y_force_N", "roll_moment_Nm", "pitch_moment_Nm")
 """Channels of the hub's loads in oblique flow, in the order of :attr:`bemt.physics.bem.solver.Solution.hub`."""
 
 
-PREPARED: Kept[solver.Prepared] = Kept(160e6, lambda made: made.st.nbytes + made.tab.nbytes)
-"""Prepared rotors of this process, by geometry, section tables, duct, effects and range: up to 160 MB, the unknowns of
-three labels [B]."""
+MOST_PREPARED = 160e6
+"""Bytes of prepared rotors that a process keeps: the unknowns of three labels [B]."""
+PREPARED: Kept[solver.Prepared] = Kept(MOST_PREPARED, lambda made: made.st.nbytes + made.tab.nbytes)
+"""Prepared rotors of this process, by geometry, section tables, duct, effects and range."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,6 +156,11 @@ class Model:
         tables = tuple((x, polar.key) for x, polar in self.polars)
         reach = (arrays.mach_nodes(self.mach_max), arrays.re_nodes(self.re_range))
         return geometry, tables, repr(self.duct), self.n_stations, *reach
+
+    @property
+    def key(self) -> tuple[Hashable, ...]:
+        """What decides the solver's loads at any point: values, never identities."""
+        return self._content, self.effects
 
     def prepared(
         self, effects: Sequence[Effect], level: float = 1.0, stations: Stations | None = None

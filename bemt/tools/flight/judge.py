@@ -8,8 +8,9 @@ evidence. :func:`bemt.judge.loss.decide` says the answer; one that names only a 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache, partial
 from itertools import combinations
 
 import numpy as np
@@ -81,7 +82,6 @@ class FlightVerdict:
     probability: dict[Explanation, float] = field(default_factory=dict)  # Of all [1]
     # Standard deviation of a share between healthy flights, or between vehicles where none is given [1]
     scatter: float = float("nan")
-    visible: float = float("nan")  # Smallest change of any one rotor's drive that would be said here [1]
     # Healthy flights accused when each is judged by the others, of how many
     accused: int = 0
     healthy: int = 0
@@ -92,6 +92,12 @@ class FlightVerdict:
     given: int = 0  # Healthy flights to compare with
     sessions: int = 1  # Sessions of them that are known
     in_flight: bool = False  # Whether what is said changed within the flight
+    _shows: Callable[[], float] = field(default=lambda: float("nan"), repr=False)
+
+    @property
+    def visible(self) -> float:
+        """Smallest change of any one rotor's drive that would be said here; found when it is asked for [1]."""
+        return self._shows()
 
     @property
     def total_moved(self) -> bool:
@@ -125,8 +131,10 @@ def judge(
     cause = beside.change.causes if beside.change is not None else ()
     out = FlightVerdict(
         sure.said, change - change.mean(), next_flight(sure.said, layout, n, day == ""), sure.found, sure.P,
-        sure.scatter, _visible(calm, layout, label, day), total=float(change.mean()) if n else float("nan"),
-        total_half=half, given=n, in_flight=bool(sure.said.effects) and set(sure.said.effects) <= set(cause),
+        sure.scatter, total=float(change.mean()) if n else float("nan"), total_half=half, given=n,
+        in_flight=bool(sure.said.effects) and set(sure.said.effects) <= set(cause),
+        _shows=partial(_visible, tuple(map(tuple, calm)), None if layout is None else tuple(map(tuple, layout)),
+                       flight.size, tuple(label), day),
     )  # fmt: skip
     if sure.said.verdict == "none" and out.total_moved:
         step = "weigh the vehicle and charge the battery, then hover 30 s; --healthy-mass-kg, the mass of the " \
@@ -149,9 +157,13 @@ def judge(
                    sessions=int(np.unique(label).size))  # fmt: skip
 
 
-def _visible(calm: Array, layout: Array | None, days: Array, day: int | None | str) -> float:
+@lru_cache(maxsize=64)
+def _visible(
+    healthy: tuple[tuple[float, ...], ...], places: tuple[tuple[float, ...], ...] | None, B: int,
+    days: tuple[int, ...], day: int | None | str,
+) -> float:  # fmt: skip
     """Smallest change of one rotor's drive from which any would be said, in a flight that is healthy but for it [1]."""
-    B = calm.shape[1]
+    calm, layout = np.array(healthy).reshape(-1, B), None if places is None else np.array(places)
     ways, axes = directions(B, layout), axes_of(layout, B)
     D = np.array([axes @ ways[blade(k + 1)] for k in range(B)])
     hidden, base = int(np.argmin(np.linalg.norm(D, axis=1))), calm.mean(axis=0) if len(calm) else np.zeros(B)
