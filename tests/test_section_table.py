@@ -5,12 +5,14 @@ from __future__ import annotations
 import dataclasses
 import subprocess
 import sys
+from itertools import product
 
 import numpy as np
 import pytest
 
 from bemt.physics.sections import neuralfoil
 from bemt.physics.sections.rule import FAMILIES, RuleSection, airfoil
+from bemt.rotors.case.unknowns import section_of
 from geometry.airfoil import Airfoil, naca, naca4
 
 
@@ -49,6 +51,10 @@ def test_the_rule_and_its_ranges_need_no_network() -> None:
             assert neuralfoil.covers(airfoil(section).four_digit, 3.0)
     for ends in ((0.02, 0.4, 0.06), (0.07, 0.4, 0.12), (0.03, 0.45, 0.12)):
         assert neuralfoil.covers(naca4(*ends).four_digit, 1.0) and neuralfoil.covers(naca4(*ends).four_digit, 9.0)
+    for kind in ("slow_flyer", "sport", "reversible", None):  # what a label's rotor may be
+        camber, thickness = section_of(kind)
+        for ends in product((camber.low, camber.value, camber.high), (thickness.low, thickness.high), (1.0, 5.0)):
+            assert neuralfoil.covers(naca4(ends[0], 0.4, ends[1]).four_digit, ends[2])
     assert naca("4412").four_digit == (0.04, 0.4, 0.12)
     assert naca4(0.04, 0.4, 0.12, te_gap=0.0).four_digit is None  # another shape
     assert not neuralfoil.covers((0.04, 0.42, 0.10), 3.0) and not neuralfoil.covers((0.04, 0.4, 0.10), 9.5)

@@ -119,7 +119,7 @@ def _cubic(nodes: Array, x: float) -> tuple[int, Array]:
     return first, np.array([np.prod([(x - b) / (a - b) for b in near if b != a]) for a in near])
 
 
-TABLE_VERSION = 5
+TABLE_VERSION = 6
 """Raise when the making of tables changes: older cache entries are then ignored."""
 RAW_LIMIT_DEG = 20.0
 """NeuralFoil is used up to this |alpha| at most (beyond 20-25 deg it has no training data)."""
