@@ -179,6 +179,16 @@ def test_one_of_several_tables_is_asked_for_and_taken_by_name_at_every_door(form
         import_file(f"{file}#third")
 
 
+def test_a_sheet_of_numbers_that_were_typed_as_text_is_the_one_that_holds_any(tmp_path: Path) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for row in (["Drehzahl (U/min)", "Schub (g)"], ["3000", "100,5"], ["4000", "180,2"], ["5000", "283,9"]):
+        book.active.append(row)
+    book.create_sheet("empty")
+    book.save(tmp_path / "a.xlsx")
+    assert import_file(tmp_path / "a.xlsx")["thrust_N"] == pytest.approx(np.array([100.5, 180.2, 283.9]) * 9.80665e-3)
+
+
 def test_a_mark_in_the_name_of_a_file_is_no_sheet(tmp_path: Path) -> None:
     (tmp_path / "run#2.csv").write_bytes(text(ROWS))
     assert len(import_file(tmp_path / "run#2.csv")) == len(ROWS) - 1

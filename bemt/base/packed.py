@@ -244,6 +244,7 @@ def _workbook(raw: bytes, name: str, most: int | None) -> bytes:
     except (CalamineError, zipfile.BadZipFile, OSError) as error:
         raise InputError(_damaged(name, error)) from error
     tables = [title for title, (_, is_table) in sheets.items() if is_table]
+    tables = tables or [title for title, (text, _) in sheets.items() if text.count("\n") > 1]  # numbers typed as text
     return sheets[_chosen(name, tables, list(sheets), "sheets")][0].encode()[:most]
 
 

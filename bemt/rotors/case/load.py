@@ -10,8 +10,10 @@ import copy
 import hashlib
 import os
 import re
+import shlex
 import tomllib
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -496,8 +498,13 @@ def find_cases(paths: Iterable[str | Path]) -> list[Path]:
         elif item.is_file():
             found.append(item)
         else:
-            label = re.fullmatch(r"[\d.]+x[\d.]+(x\d+)?", item.as_posix())
-            hint = f"A label? `bemt new {item.as_posix()}` writes its case" if label else "Check the path"
+            hint = "Check the path"
+            from geometry.common import GeometryError
+            from geometry.designation import parse_designation
+
+            with suppress(GeometryError):
+                parse_designation(item.as_posix())
+                hint = f"A label? `bemt new {shlex.quote(item.as_posix())}` writes its case"
             fault = Fault(item.as_posix(), "", "no such file or folder", "a case file or a folder of cases", hint)
             faults.append(fault)
     refuse(faults)
