@@ -577,3 +577,15 @@ def test_a_unit_that_is_named_is_stated_next(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text(f"rpm,thrust N,torque N m\n{table}\n")
     text, kept = bemt.diagnose(tmp_path / "log.csv", "12x6").text, (tmp_path / "recording.toml").as_posix()
     assert f"--unit torque=Ncm --out {kept}" in text and f"bemt diagnose {kept} --case 12x6" in text
+
+
+def test_watts_of_nobody_knows_what_are_asked_about_before_a_torque_cell(tmp_path: Path) -> None:
+    """Electrical watts under "Power (W)": torque is a third too high, and no cell has a fault."""
+    p = bemt.propeller("9x6E")
+    found = p.solve(np.arange(3000.0, 9001.0, 1000.0), J=np.zeros(7), bands=False)
+    rows = zip(found.rpm, found.thrust_N, found.torque_Nm * found.rpm * np.pi / 30.0 / 0.75, strict=True)
+    body = "".join(f"{n:.0f},{T:.4f},{P:.2f}\n" for n, T, P in rows)
+    (tmp_path / "a.csv").write_text(f"rpm,Thrust (N),Power (W)\n{body}", "utf-8")
+    assert "if a wattmeter read it, name the column electrical_power_W" in " ".join(
+        bemt.diagnose(str(tmp_path / "a.csv"), p).text.split()
+    )

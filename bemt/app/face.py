@@ -184,7 +184,8 @@ def parser_of(function: Callable[..., Any], prog: str = "bemt", everything: bool
 
 def _add(parser: Parser, one: Option, told: Declaration, visible: bool) -> None:
     """Option or bare word of a parameter."""
-    said = f"Do not {one.help[:1].lower()}{one.help[1:]}" if one.option.startswith("--no-") else one.help
+    on = one.kind == "flag" and one.default is True
+    said = f"Do not {one.help[:1].lower()}{one.help[1:]}" if on else one.help
     words = said.replace("%", "%%") if visible else argparse.SUPPRESS
     metavar = one.name.split("_")[0].upper()
     if one.kind == "flag":

@@ -41,6 +41,8 @@ _DRIVE_SPEEDS = {
     "ESC_rpm": "right only if the ESC was given the pole count and there is no gear",
 }
 """Speeds that are the rotor's where there is no other, and on what condition."""
+AS_SHAFT = "power_W: taken as shaft power"
+"""Start of the note on a power of which the heading does not say whose it is."""
 _NO_MOTOR = 0.95
 """Shaft power over electrical power that no motor with its controller reaches: declared. [1]"""
 
@@ -179,7 +181,7 @@ def named(d: Dataset) -> Dataset:
     bare = values.get("power_W") if plain else d.values.get("P_W")
     _power(values, names, notes, bare, unit_alone(d.headings.get("P_W", "")) is not None)
     if plain and "power_W" in values:
-        notes.append("power_W: taken as shaft power; if a wattmeter read it, name the column electrical_power_W")
+        notes.append(f"{AS_SHAFT}; if a wattmeter read it, name the column electrical_power_W")
     none = int(np.sum(~np.isfinite(values["run"]))) if "run" in values else 0
     if none:
         notes.append(f"{number_of(none, 'row')} without a run: taken as run 0")

@@ -10,6 +10,7 @@ import numpy as np
 
 from bemt import __version__
 from bemt.base.tables import or_null, text_table
+from bemt.data.recordings.channels import AS_SHAFT
 from bemt.judge.compare.change_document import WORD, families, title_of
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import other_rotor
@@ -227,7 +228,9 @@ def explanation(d: Diagnosis) -> list[str]:
     """Say the answer in a few sentences."""
     decision, catalogue = d.said, effects.catalogue()
     lines = [headline(d), *(f"{words[:1].upper()}{words[1:]}." for words in d.problem.no_check)]
-    lines += [f"Before any physics: {note}." for note in d.problem.notes if NO_SPEED in note]
+    off_torque = decision.verdict != "none" and abs(d.problem.level.get("torque_Nm", 0.0)) > LEVEL
+    marks = (NO_SPEED, AS_SHAFT) if off_torque else (NO_SPEED,)
+    lines += [f"Before any physics: {note}." for note in d.problem.notes if any(mark in note for mark in marks)]
     lines += [f"Before any physics: {f}" for f in d.problem.findings[:_FINDINGS]]
     if len(d.problem.findings) > _FINDINGS:
         lines[-1] += f" And {len(d.problem.findings) - _FINDINGS} more; `import` shows all."
