@@ -123,6 +123,8 @@ def thrust_factor(rpm: Array, thrust_N: Array) -> float:
 
 ROTORS = 4
 HOVER = 0.5
+CELL_V = 3.7
+"""Nominal voltage of a lithium-polymer cell [V]."""
 
 
 class ArdupilotExport(LoadsExport):
@@ -151,7 +153,8 @@ class ArdupilotExport(LoadsExport):
         T_max = 0.5 * t.rho * area * v_max**2
         hover = HOVER * T_max
         v_hover = v_max * float(np.sqrt(HOVER))
-        volts = 22.2
+        cells = job.case.get("drive.cells")
+        volts = CELL_V * (cells or 6)
         frame = {
             "mass": ROTORS * hover / G0, "num_motors": ROTORS, "disc_area": ROTORS * np.pi * t.diameter_m**2 / 4.0,
             "propExpo": e, "hoverThrOut": HOVER, "refVoltage": volts, "maxVoltage": volts,
@@ -162,6 +165,7 @@ class ArdupilotExport(LoadsExport):
         lines += [
             "# mass, num_motors and hoverThrOut are a stand-in: four rotors at half of full thrust. Keep them and",
             "# refVoltage x refCurrent together: SITL works the outflow speed and the effective area out of them.",
+            *([] if cells else ["# refVoltage and maxVoltage are those of six cells: the case states no battery."]),
             "# refSpd, refAngle, refRotRate and the battery are the vehicle's; add them.",
         ]
         body = json.dumps({k: float(f"{v:.9g}") if isinstance(v, float) else v for k, v in frame.items()}, indent=1)
