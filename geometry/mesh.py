@@ -146,8 +146,8 @@ def hub_profile(rotor: Rotor, root: Array) -> Array:
         rotor.hub_extent if rotor.hub_length is not None else max(rotor.hub_extent, 1.04 * need + 0.02 * rotor.Rhub)
     )
     if length < need:
-        wanted = f"at least {need:g} m, which the blade's root takes"
-        raise GeometryError([("hub_length", f"{length:g} m", wanted, "Leave it out to have it fitted")])
+        wanted = f"at least {1e3 * need:.4g} mm, which the blade's root takes"
+        raise GeometryError([("hub_length", f"{1e3 * length:.4g} mm", wanted, "Leave it out to have it fitted")])
     back, front = middle - 0.5 * length, middle + 0.5 * length
     points = [(0.0, back), (rotor.Rhub, back), (rotor.Rhub, front)]
     if rotor.spinner_length > 0:

@@ -279,16 +279,11 @@ def changed(
             hint = "Head the column rpm, or record watts: thrust is compared at equal speed, power or throttle"
             expected = "a speed of rotation, J, electrical power or a throttle in both"
             raise InputError([Fault(r.points.name, "", _told(r), expected, hint) for r in silent])
-        got = f"{_told(a)} in A, {_told(b)} in B"
-        raise InputError(
-            Fault(
-                f"{a.points.name}, {b.points.name}",
-                "",
-                got,
-                "one load that both recorded at two or more speeds of rotation, above zero",
-                "Name units in the headings, or use a recording.toml",
-            )
-        )
+        got, expected = f"{_told(a)} in A, {_told(b)} in B", "one load that both recorded at two or more speeds"
+        hint = "Name units in the headings, or use a recording.toml"
+        if single := [run for run in (a, b) if len(run) == 1]:
+            hint = f"One point is no curve. Give two more, or `bemt compare {single[0].points.name} --case CASE`"
+        raise InputError(Fault(f"{a.points.name}, {b.points.name}", "", got, expected, hint))
     scatter = {**rotor.likelier, **behind.likelier}
     ratios = {c.channel: fits.ratio_of(c, scatter[n]) for n, c in channels.items()}
     assumed = tuple(_assumed(a, b, diameter, rotor.channels))
