@@ -69,6 +69,11 @@ def unplanned(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(session._Log, "planned", lambda *_: None)
 
 
+def _heeding() -> None:
+    """Hear Ctrl-C, which a shell makes its background jobs ignore."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def _stopped_after(stand: hand.Simulated, since: float) -> float:
     """Seconds until the output was at its stop value."""
     until = time.monotonic() + 5.0
@@ -128,13 +133,13 @@ def _tried(stand: hand.Simulated, what: str) -> tuple[float, str]:
     stand.ask("break", what="")
     stand.ask("set up", kind="again", runs=[], mended=[], day=0)
     if what in ("killed", "interrupted"):
-        child = subprocess.Popen([sys.executable, "-c", HEAD, stand.wire, stand.address])
+        child = subprocess.Popen([sys.executable, "-c", HEAD, stand.wire, stand.address], preexec_fn=_heeding)
         while stand.ask("output")["us"] < 1400.0 and child.poll() is None:
             time.sleep(0.02)
         guards = psutil.Process(child.pid).children() if child.poll() is None else []
         since = time.monotonic()
         child.send_signal(signal.SIGKILL if what == "killed" else signal.SIGINT)
-        child.wait()
+        child.wait(timeout=20.0)
         seconds = _stopped_after(stand, since)
         assert not psutil.wait_procs(guards, timeout=20.0)[1], "its guard lets go of the wire"
         return seconds, ""
