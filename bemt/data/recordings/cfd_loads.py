@@ -37,7 +37,8 @@ _SLIGHT = 0.01
 NET = ("net", "total", "")
 _FORCE = re.compile(r"force_total(?:_([xyz]))?(?:_N)?( along .*)?|C(?:F)([xyz])")
 _MOMENT = re.compile(r"moment_total(?:_([xyz]))?(?:_Nm)?( along .*)?|C(?:M)([xyz])")
-_ALONG_VECTOR, _PARALLEL = re.compile(r"along \(([^()]*)\)"), 0.1  # sine of the angle between two axes
+_DIRECTION, _NUMBER = re.compile(r"(?<=along )\([^()]*\)"), re.compile(r"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?")
+_PARALLEL = 0.1  # sine of the angle up to which two axes are one [1]
 _ASIDE = re.compile(
     r"(force|moment)_(pressure|viscous|porous|internal)(_|\b)|center_of_pressure|(force|moment)_coefficient"
 )
@@ -431,23 +432,28 @@ def by_zone(run: OpenRun, quantity: str) -> dict[str, LoadColumn]:
     return out
 
 
-def one_rotor(run: OpenRun) -> None:
+def same_shaft(run: OpenRun) -> None:
     """Refuse forces and moments that are not of one shaft, or not of the same zones."""
     forces, moments = run.pools.get("thrust", {}), run.pools.get("torque", {})
     if not forces or not moments:
         return
-    first = [next(iter(pool.values())) for pool in (forces, moments)]
-    told = [_ALONG_VECTOR.search(c.name) for c in first]
-    if all(told):
-        a, b = (np.array([float(x) for x in t[1].split()]) for t in told if t)
-        if np.linalg.norm(np.cross(a, b)) > _PARALLEL * np.linalg.norm(a) * np.linalg.norm(b):
-            got = f"the moment about ({told[1][1]}), where the force is along ({told[0][1]})"  # type: ignore[index]
-            hint = f"Report it about that axis, or leave it out: --ignore {shlex.quote(first[1].stem)}"
-            run.fault(first[1], first[1].name, got, "both along the shaft", hint)
+    thrust, torque = next(iter(forces.values())), next(iter(moments.values()))
+    (pull, a), (turn, b) = _direction(thrust), _direction(torque)
+    if np.linalg.norm(np.cross(a, b)) > _PARALLEL * np.linalg.norm(a) * np.linalg.norm(b):
+        hint = f"Report it about that axis, or leave it out: --ignore {shlex.quote(torque.stem)}"
+        run.fault(torque, torque.name, f"the moment about {turn}, where the force is along {pull}",
+                  "both along the shaft", hint)  # fmt: skip
     alone = [z for z in moments if z not in forces and z.lower() not in NET]
     if alone and run.run.run.zones is None and any(z in forces for z in moments if z.lower() not in NET):
         got, hint = f"a moment of {', '.join(alone)} and no force of it", "Export the force of every zone"
-        run.fault(first[0], "zones", got, "forces and moments of the same zones", f"{hint}; --zones: those that count")
+        run.fault(thrust, "zones", got, "forces and moments of the same zones", f"{hint}; --zones: those that count")
+
+
+def _direction(c: LoadColumn) -> tuple[str, Array]:
+    """Direction that the name of a column holds, as it stands there and as a vector; zero where there is none."""
+    told = _DIRECTION.search(c.name)
+    numbers = [float(x) for x in _NUMBER.findall(told[0])] if told else []
+    return (told[0] if told else "", np.array(numbers if len(numbers) == 3 else [0.0] * 3))
 
 
 def other_axes(run: OpenRun, c: LoadColumn) -> list[LoadColumn]:

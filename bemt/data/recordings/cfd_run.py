@@ -45,9 +45,9 @@ from bemt.data.recordings.cfd_loads import (
     by_zone,
     columns_of,
     counted_zones,
-    one_rotor,
     other_axes,
     other_than_loads,
+    same_shaft,
 )
 from bemt.data.recordings.cfd_setup import (
     THRUSTS,
@@ -153,7 +153,7 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> CfdRun:
         _ask_all(work)
         raise InputError(work.told)
     loads = {name: load for q in ("thrust", "torque", "power") for name, load in _summed(work, q).items()}
-    one_rotor(work)
+    same_shaft(work)
     for column in work.named("duct_thrust")[:1] if run.columns.duct_thrust is not None else []:
         if (own := work.mean("duct_thrust", column)) is not None:
             loads["duct_thrust"] = own
