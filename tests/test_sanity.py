@@ -386,6 +386,42 @@ def test_time_going_backwards() -> None:
     assert check(recording(runs), diameter_m=10 * INCH) == ()
 
 
+def stepped(interval: float, lag: float, late: int = 0) -> dict[str, np.ndarray]:
+    """A log of steps of the pulse width, each held over 40 rows; the speed follows with a time constant."""
+    command = np.repeat([1.1e-3, 1.5e-3, 1.3e-3, 1.8e-3, 1.2e-3], 40)
+    rpm = 1.2e7 * (command - 0.9e-3)
+    for i in range(1, rpm.size):
+        rpm[i] += (rpm[i - 1] - rpm[i]) * math.exp(-interval / lag)
+    rpm = np.r_[np.full(late, rpm[0]), rpm[: rpm.size - late]] * (1 + 1e-3 * np.sin(np.arange(rpm.size)))
+    return {"time_s": interval * np.arange(rpm.size), "pulse_width_s": command, "rpm": rpm, "thrust_N": 1.2e-7 * rpm**2}
+
+
+@pytest.mark.parametrize(("scale", "words"), [(1e3, "ms taken for s"), (1e6, "us taken for s")])
+@pytest.mark.parametrize("response", ["rpm", "thrust_N"])
+def test_a_rotor_that_takes_minutes_to_follow_has_another_unit_of_time(scale: float, words: str, response: str) -> None:
+    values = stepped(0.02, 0.12)
+    values["time_s"] *= scale
+    del values[{"rpm": "thrust_N", "thrust_N": "rpm"}[response]]
+    (found,) = said(check(recording(values)), "time_unit")
+    assert found.channel == "time_s" and found.evidence.startswith(f"{response} has followed 4 steps of the command")
+    assert words in found.correction
+
+
+@pytest.mark.parametrize(
+    ("interval", "lag", "late"),
+    [
+        (0.02, 0.12, 0),  # the same log in seconds
+        (30.0, 0.12, 0),  # points written down by hand
+        (30.0, 0.12, 1),  # read at the moment of the command
+        (1000.0, 0.5, 1),  # one point in a quarter of an hour
+        (1.0, 3.0, 0),  # a slow controller
+        (20.0, 4.0, 1),
+    ],
+)
+def test_slow_recordings_keep_their_seconds(interval: float, lag: float, late: int) -> None:
+    assert not said(check(recording(stepped(interval, lag, late))), "time_unit")
+
+
 def test_nothing_is_said_where_nothing_can_be_known() -> None:
     values = stand()
     assert check(recording({"thrust_N": values["thrust_N"] * KGF})) == ()

@@ -15,6 +15,7 @@ from bemt.base.units import ZERO_CELSIUS
 from bemt.data.readers.samples import STICKS, lone, stuck
 from bemt.data.recordings.channels import shaft_power
 from bemt.data.recordings.findings import (
+    LEAST_EFFICIENCY,
     Facts,
     Finding,
     check_for,
@@ -35,8 +36,12 @@ SENSORS = (
 STUCK = ("thrust_N", "duct_thrust_N", "torque_Nm", "current_A", "power_W", "electrical_power_W", "rpm",
          "electrical_rpm", "optical_rpm", "voltage_V")  # fmt: skip
 """Channels that cannot stay the same while others change."""
+SLOWEST_S = 10.0
+"""Time in which any rotor has followed a step of its command by two thirds, slow controllers included. [s]"""
 # Rows of either unit, least factor between two units, and most that a load over the square of the speed varies in one.
 _FEW, _JUMP, _STEADY = 3, 9.0, 3.0
+HELD, STEPS = 6, 2
+"""Rows for which a command is held after a step; steps that are looked at, at least. [1]"""
 
 
 def _varies(v: Array) -> bool:
@@ -243,6 +248,41 @@ def time_backwards(facts: Facts) -> Iterator[Finding]:
         yield Finding("time_backwards", facts.named("time_s"), text, fix, tuple(int(r) for r in odd), why)
 
 
+@check_for("slow_rotor")
+def slow_rotor(facts: Facts) -> Iterator[Finding]:
+    """Time in a smaller unit than its heading: the rotor follows steps of its command over minutes.
+
+    Rows far apart alone say nothing, since points written down by hand are. But one that took the new speed is there
+    by the next row; none needs more than `SLOWEST_S`, whatever its size.
+    """
+    t, told, command = facts.time_s, facts.first("rpm", "thrust_N"), facts.first("pwm_s", "throttle")
+    if t is None or command is None or told is None:
+        return
+    response, (_, c), y = told[0], command, told[1]
+    rows = np.flatnonzero(np.isfinite(t) & np.isfinite(c) & np.isfinite(y))
+    t, c, y = t[rows], c[rows], np.abs(y[rows])
+    if rows.size < 2 * HELD or float(np.ptp(c)) == 0.0 or float(np.ptp(y)) == 0.0:
+        return
+    level = (c - c.min()) / np.ptp(c)
+    first = np.flatnonzero(np.abs(np.diff(level)) > 0.1) + 1  # the row that has a new command first
+    followed, waited = [], []
+    for i in first[(first >= 2) & (first <= rows.size - HELD)]:
+        held = level[i : i + HELD]
+        before, after = float(np.median(y[i - 2 : i])), float(np.median(y[i + HELD - 2 : i + HELD]))
+        steady = float(np.ptp(held)) < 0.01 and abs(level[i - 2] - level[i - 1]) < 0.01
+        if steady and abs(after - before) > 0.1 * float(np.max(y)):
+            # the first row may be read at the moment of the command: one whole interval later counts
+            followed.append((float(y[i + 1]) - before) / (after - before))
+            waited.append(float(t[i + 1] - t[i]))
+    if len(followed) < STEPS or float(np.median(waited)) < SLOWEST_S or float(np.median(followed)) > 1.0 - np.exp(-1.0):
+        return
+    text = f"{response} has followed {len(followed)} steps of the command by {np.median(followed):.0%} only, "
+    text += f"{np.median(waited):.4g} s after them, in the median; a rotor takes less than {SLOWEST_S:g} s"
+    units = [e for e in unit_errors.errors("time") if e.stated == "s"]
+    fix = next((e for e in units if e.repair * float(np.median(waited)) < SLOWEST_S), units[-1]).words
+    yield Finding("time_unit", facts.named("time_s"), text, fix, (), "warning")
+
+
 @check_for("lengths")
 def lengths(facts: Facts) -> Iterator[Finding]:
     """Lengths that only another unit makes sense of."""
@@ -399,6 +439,36 @@ def power_above_input(facts: Facts) -> Iterator[Finding]:
         if np.any(lightest) and float(np.median(electric[odd])) < float(np.median(electric[lightest])):
             fix = f"at part throttle only: a sensor that reads chopped current low; or {fix}"
         yield Finding("power_above_input", words, text, fix, rows_of(odd), contradicts(odd, facts.loaded))
+
+
+USUAL_MERIT = 0.5
+"""Static figure of merit of a propeller, which tells the power of its shaft without a torque cell: declared [1]."""
+
+
+@check_for("power_lost")
+def power_lost(facts: Facts) -> Iterator[Finding]:
+    """Far more power into the motor than its shaft takes; without a torque, than a usual rotor of that thrust takes."""
+    electric, rows, words = facts.filled.get("electrical_power_W"), facts.loaded, "the shaft takes"
+    shaft = shaft_power(facts.filled)
+    if electric is None or facts.bare:
+        return
+    if shaft is None or not np.any(np.isfinite(shaft[rows])):
+        T, rpm, D = facts.filled.get("thrust_N"), facts.rpm, facts.diameter_m
+        if T is None or (D is None and rpm is None) or facts.ducted:
+            return
+        with np.errstate(all="ignore"):
+            disk = D if D is not None else (np.abs(T) / (0.1 * facts.rho * (np.asarray(rpm) / 60.0) ** 2)) ** 0.25
+            shaft = np.abs(T) ** 1.5 / np.sqrt(0.5 * math.pi * facts.rho) / disk / USUAL_MERIT
+        rows, words = facts.loaded & facts.still & (T > 0.0), "by its thrust the shaft takes about"
+    with np.errstate(all="ignore"):
+        ratio = (np.abs(shaft) / electric)[rows]
+    ratio = ratio[np.isfinite(ratio)]
+    if ratio.size < 3 or not 0.0 < float(np.median(ratio)) < LEAST_EFFICIENCY:
+        return
+    text = f"{words} {np.median(ratio):.0%} of it ({np.min(ratio):.0%} to {np.max(ratio):.0%} under load); "
+    text += f"a motor turns {LEAST_EFFICIENCY:.1%} or more into power of the shaft"
+    fix = "check unit, gain and zero of the current and of the voltage; or several motors are on that supply"
+    yield Finding("power_lost", facts.named("electrical_power_W"), text, fix, (), "warning")
 
 
 _LEAST_MERIT = 0.12  # Figure of merit of the poorest rotor: small ones in published tables reach 0.3 (declared) [1]
