@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from bemt.tools.drive.actions import drive as drive
     from bemt.tools.drive.actions import map as map
     from bemt.tools.drive.actions import motor as motor
+    from bemt.tools.drive.actions import thrusters as thrusters
     from bemt.tools.exports.actions import export as export
     from bemt.tools.flight.actions import fly as fly
 

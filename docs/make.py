@@ -28,6 +28,7 @@ from bemt.rotors.case.schema import GROUPS, CaseFile
 from bemt.rotors.case.unknowns import completed
 from bemt.tools.cfd.schema import AxesTable, CampaignFile
 from bemt.tools.drive.motor_result import MotorToml
+from bemt.tools.drive.thrusters_result import ThrustersFile
 
 CASES = ("ds30", "prop_8x5", "prop_10x5", "prop_12x6", "prop_14x8")
 """Cases on the pages: the shipped ones, whatever else is in the folder."""
@@ -113,6 +114,7 @@ FILES: dict[str, tuple[type[Table], str]] = {
         "Measurements of a motor constant, for `bemt lab motor` "
         "([one with its recordings](../reports/drive/motor_mn4006/motor.toml)).",
     ),
+    "thrusters": (ThrustersFile, "For `bemt lab thrusters` ([example](files/thrusters.toml))."),
     "campaign": (CampaignFile, "OpenFOAM runs of one case, for `bemt cfd` ([example](files/campaign.toml))."),
 }
 """Files on the reference page: model, and what the file is for."""

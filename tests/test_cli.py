@@ -339,7 +339,7 @@ def test_a_file_for_a_folder_is_refused_before_any_work(
     assert begun
 
 
-@pytest.mark.parametrize("command", ["motor", "cfd"])
+@pytest.mark.parametrize("command", ["thrusters", "motor", "cfd"])
 def test_a_missing_file_is_not_called_a_case_file_where_none_is_wanted(
     command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,4 +1,4 @@
-"""Motor constant: conventions, three methods, systematic errors named."""
+"""Motor constant: conventions, waveforms, three methods, systematic errors named."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import pytest
 from PIL import Image
 
 from bemt.app.cli import main
+from bemt.base.errors import InputError
 from bemt.tools.drive import motor_constant, motor_result, outputs
 from bemt.tools.drive import motor_constant as mc
 
@@ -50,6 +51,38 @@ def test_the_loop_reads_torque_and_knows_its_live_zero() -> None:
     # a resistor that is 4 % larger than assumed: slope and zero move together
     volts = (4.0 + 8.0 * np.array([0.0, 1.0])) * 1e-3 * 260.0
     assert loop.torque(volts) == pytest.approx([0.02, 1.06])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_waveform_gives_speed_and_amplitude_under_noise_and_harmonics(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    f, a = rng.uniform(40.0, 400.0), rng.uniform(0.5, 20.0)
+    t = np.arange(2500) / 2500.0 * rng.uniform(2.2, 9.0) / f
+    wave = np.cos(2 * math.pi * f * t + rng.uniform(0, 6)) + 0.12 * np.cos(6 * math.pi * f * t) + 0.03
+    got = mc.fit_waveform(t, a * (wave + 0.02 * rng.standard_normal(len(t))))
+    assert got.frequency_Hz == pytest.approx(f, rel=2e-3) and got.amplitude_V == pytest.approx(a, rel=5e-3)
+    assert got.harmonics[0] == pytest.approx(0.12, abs=0.01) and got.offset_V == pytest.approx(0.03 * a, abs=0.01 * a)
+    assert got.ke(7, "line", "wye") == pytest.approx(a / S3 / (2 * math.pi * f / 7), rel=6e-3)
+
+
+def test_oscilloscope_files_of_three_kinds(tmp_path: Path) -> None:
+    t = np.linspace(-0.02, 0.02, 200)
+    v = 3.0 * np.sin(2 * math.pi * 100.0 * t)
+    rows = list(zip(t, v, strict=True))
+    keysight = "x-axis,1\nsecond,Volt\n" + "".join(f"{a:.6e},{b:.6e}\n" for a, b in rows)
+    plain = "Time (ms),CH1 (mV)\n" + "".join(f"{1e3 * a:.6f},{1e3 * b:.4f}\n" for a, b in rows)
+    head = [("Record Length", "200"), ("Vertical Units", "V"), ("Horizontal Units", "s")]
+    tek = "".join(
+        f"{head[i][0] if i < 3 else ''},{head[i][1] if i < 3 else ''},,{a:.6e},{b:.6e},\n"
+        for i, (a, b) in enumerate(rows)
+    )
+    for name, text in (("k", keysight), ("p", plain), ("t", tek)):
+        (tmp_path / name).write_text(text)
+        got_t, got_v = motor_result.read_waveform(tmp_path / name)
+        assert np.allclose(got_t, t, atol=1e-8) and np.allclose(got_v, v, atol=1e-5), name
+    (tmp_path / "none").write_text("a,b\n1,2\n2,3\n")
+    with pytest.raises(InputError, match="no units"):
+        motor_result.read_waveform(tmp_path / "none")
 
 
 def folder(tmp_path: Path, seed: int, planted: dict[str, float] | None = None) -> Path:
@@ -140,6 +173,30 @@ def test_command_shows_the_case_and_labels_it(tmp_path: Path, capsys: pytest.Cap
     folder(made, 0, {"torque.shunt": 1.05})
     assert main(["motor", str(made)]) == 1
     assert "torque.shunt 1.0" in capsys.readouterr().out
+
+
+def test_waveforms_stand_for_trials(tmp_path: Path) -> None:
+    path = folder(tmp_path, 6)
+    ke = 0.0311 / S32
+    for k, rpm in enumerate((1000.0, 1500.0, 2000.0, 2500.0, 3000.0)):
+        omega = rpm * math.pi / 30.0
+        t = np.arange(400) * 1e-4
+        v = ke * omega * np.sin(12 * omega * t)
+        (path / f"s{k}.csv").write_text(
+            "Time (s),CH1 (V)\n" + "".join(f"{a:.4f},{b:.5f}\n" for a, b in zip(t, v, strict=True))
+        )
+    text = (
+        (path / "motor.toml")
+        .read_text()
+        .replace('file = "back_emf.csv"', f"waveforms = {[f's{k}.csv' for k in range(5)]}")
+    )
+    text = text.replace('measure = "peak_to_peak"\n', "").replace(
+        'winding = "delta"', 'winding = "delta"\npole_pairs = 12'
+    )
+    (path / "motor.toml").write_text(text)
+    trials = motor_result.read(path)
+    assert trials.measured.back_emf is not None
+    assert trials.measured.back_emf.slope == pytest.approx(ke, rel=1e-3)
 
 
 def test_faults_of_motor_toml_come_all_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

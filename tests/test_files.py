@@ -16,9 +16,10 @@ from bemt.data.readers.recording_toml import RecordingToml
 from bemt.rotors.case.schema import CaseFile
 from bemt.tools.cfd.schema import CampaignFile
 from bemt.tools.drive.motor_result import MotorToml
+from bemt.tools.drive.thrusters_result import ThrustersFile
 
 MODELS: dict[str, type[Table]] = {
-    "campaign": CampaignFile, "motor": MotorToml, "recording": RecordingToml,
+    "campaign": CampaignFile, "motor": MotorToml, "recording": RecordingToml, "thrusters": ThrustersFile,
 }  # fmt: skip
 Path_ = tuple[Any, ...]
 

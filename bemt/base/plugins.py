@@ -30,7 +30,7 @@ from typing import Any
 from bemt import __version__
 
 TOOLS: dict[str, tuple[str, ...]] = {
-    "cfd": ("cfd", "openfoam"), "design": ("choose", "design"), "drive": ("drive", "map", "motor"),
+    "cfd": ("cfd", "openfoam"), "design": ("choose", "design"), "drive": ("drive", "map", "motor", "thrusters"),
     "exports": ("export",), "flight": ("fly",), "stand": ("stand",),
 }  # fmt: skip
 """Tools of this version, with the actions and targets that are missing without them."""

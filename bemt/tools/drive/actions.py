@@ -1,4 +1,4 @@
-"""Actions of the drive: drive, map, motor."""
+"""Actions of the drive: drive, map, motor, thrusters."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     Path = str | os.PathLike[str]
 
-__all__ = ["drive", "map", "motor"]
+__all__ = ["drive", "map", "motor", "thrusters"]
 
 
 @action(
@@ -181,3 +181,44 @@ def motor(file: Path, *, out: Path | None = None) -> Told:
     found = motor_result.judge(os.fspath(file), None if out is None else os.fspath(out))
     code = EXIT_OK if found.agree else EXIT_UNCONVERGED
     return Told(found.document(), motor_result.text(found), exit_code=code)
+
+
+@action("Drive", "thrusters thrusters.toml --force-N 40", words=("file",))
+def thrusters(
+    file: Path, *, force_N: float | None = None, moment_Nm: float | None = None, out: Path | None = None
+) -> Told:
+    """Allocate force and roll moment to the thrusters of a vehicle.
+
+    Parameters
+    ----------
+    file : path
+        thrusters.toml or its folder.
+    force_N : float, optional
+        Requested force; from the file by default. [N]
+    moment_Nm : float, optional
+        Requested roll moment; from the file by default. [N m]
+    out : path, optional
+        Folder for JSON, CSV and a picture.
+
+    Returns
+    -------
+    Told
+        Schema ``bemt.thrusters.result/1``; ``exit_code`` 1 if the command is beyond the thrusters.
+
+    Raises
+    ------
+    InputError
+        With every fault of the file.
+
+    Examples
+    --------
+    >>> thrusters("no/such.toml")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    bemt.base.errors.InputError: no/such.toml: got ...
+    """
+    from bemt.tools.drive import thrusters_result
+
+    where = None if out is None else os.fspath(out)
+    found, shown, met = thrusters_result.share(os.fspath(file), force_N, moment_Nm, where)
+    return Told(found, shown, exit_code=EXIT_OK if met else EXIT_UNCONVERGED)

@@ -385,7 +385,7 @@ def repeat_spread(points: Dataset, chart: BenchMap) -> float:
     return max(spans) / float(np.max(thrust)) if spans else float("nan")
 
 
-def held_out(points: Dataset, folds: int = 5) -> HeldOut:
+def held_out(points: Dataset, folds: int = 5, smoothness: float | None = None) -> HeldOut:
     """Leave levels out in turn, fit to the rest, and make the round trip on what was left out.
 
     A plateau was recorded at pulse p with thrust T. The inverse map gives p' for T. The drive gives T at p, so the
@@ -396,7 +396,7 @@ def held_out(points: Dataset, folds: int = 5) -> HeldOut:
     wanted, pulses, found, errors = [], [], [], []
     for k in range(min(folds, len(inner))):
         out = np.isin(level, inner[k::folds])
-        chart = fit(points.select(~out), quantities=("thrust",))
+        chart = fit(points.select(~out), smoothness, quantities=("thrust",))
         test = points.select(out)
         thrust, pulse = test.thrust_N, test.pulse_us
         volts = test.voltage_V if chart.with_voltage else None

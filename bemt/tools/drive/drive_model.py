@@ -343,13 +343,13 @@ class Drive:
         """Pulse width that gives a thrust. [us]"""
         return float(self.pulses_for(thrust_N, np.array([soc]))[0])
 
-    def pulses_for(self, thrust_N: float, soc: Array) -> Array:
+    def pulses_for(self, thrust_N: float, soc: Array, temperature_C: float | None = None) -> Array:
         """Pulse widths that give a thrust at (N,) states of charge, NaN where none does. [us]"""
-        full = self.steady(self.esc.pulse_max_us, soc)
+        full = self.steady(self.esc.pulse_max_us, soc, temperature_C)
         reached = full.thrust_N >= thrust_N
         top = np.where(reached, full.rpm * math.pi / 30.0, 0.0)
         omega = _least(lambda w: np.asarray(self.rotor.thrust(w) >= thrust_N), np.zeros(soc.shape), top)[:, None]
-        warm = np.asarray(self.motor.ambient_C, dtype=float)
+        warm = np.asarray(self.motor.ambient_C if temperature_C is None else temperature_C, dtype=float)
         voc, wanted = self.battery.voc(soc)[:, None], self.rotor.torque(omega)
 
         def holds(pulse: Array) -> NDArray[np.bool_]:

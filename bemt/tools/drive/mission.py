@@ -145,7 +145,9 @@ def time_to(time_s: Array, values: Array, start_s: float) -> float:
 class Hover:
     """Hover of one rotor; NaN where the drive does not carry the weight."""
 
-    wanted_N: float  # thrust that one rotor must give. [N]
+    # thrust that one rotor must give, and the most it gives at this charge. [N]
+    wanted_N: float
+    full_N: float
     # pulse width [us] and speed [rev/min]
     pulse_us: float
     rpm: float
@@ -176,12 +178,13 @@ def settled_temperature(drive: Drive, pulse_us: float, soc: float) -> float:
 def hover(drive: Drive, mass_kg: float, rotors: int, soc: float) -> Hover:
     """Find the hover point."""
     wanted = mass_kg * G0 / rotors
+    full = float(drive.steady(drive.esc.pulse_max_us, soc).thrust_N[0])
     pulse = drive.pulse_for(wanted, soc)
     if math.isnan(pulse) or not wanted > 0.0:  # half of a full throttle that lifts nothing
-        return Hover(wanted, *[math.nan] * 6)
+        return Hover(wanted, full, *[math.nan] * 6)
     s = drive.steady(pulse, soc)
     power = float(s.power_W[0])
-    return Hover(wanted, pulse, float(s.rpm[0]), float(s.battery_A[0]), power, wanted / G0 * 1e3 / power,
+    return Hover(wanted, full, pulse, float(s.rpm[0]), float(s.battery_A[0]), power, wanted / G0 * 1e3 / power,
                  settled_temperature(drive, pulse, soc))  # fmt: skip
 
 

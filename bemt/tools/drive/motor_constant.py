@@ -170,6 +170,61 @@ def line(x: ArrayLike, y: ArrayLike, trial: ArrayLike) -> Line:
                 tuple(f"{k:g}" for k in names))  # fmt: skip
 
 
+@dataclass(frozen=True)
+class Waveform:
+    """Back-EMF seen by an oscilloscope."""
+
+    # of the fundamental [Hz], its peak [V], and the mean [V]
+    frequency_Hz: float
+    amplitude_V: float
+    offset_V: float
+    harmonics: tuple[float, float]  # third and fifth harmonic over the fundamental. [1]
+    residual_V: float  # standard deviation of what is left. [V]
+
+    def ke(self, pole_pairs: int, between: str, winding: str) -> float:
+        """Peak EMF of a winding per mechanical speed. [V s/rad]"""
+        omega = 2.0 * math.pi * self.frequency_Hz / pole_pairs
+        return self.amplitude_V / omega / voltage_factor("peak", between, winding)
+
+
+def fit_waveform(time_s: ArrayLike, volts: ArrayLike) -> Waveform:
+    """Fit fundamental, third and fifth harmonic to a waveform."""
+    from scipy.optimize import minimize_scalar
+
+    t, v = np.asarray(time_s, dtype=float), np.asarray(volts, dtype=float)
+    ok = np.isfinite(t) & np.isfinite(v)
+    t, v = t[ok], v[ok]
+    if len(t) < 16 or np.any(np.diff(t) <= 0.0):
+        raise InputError(Fault("", "waveform", f"{len(t)} samples", "16 or more, time rising"))
+    t = t - t[0]
+    even = np.interp(np.linspace(0.0, t[-1], len(t)), t, v)
+    padded = 8 * len(even)
+    spectrum = np.abs(np.fft.rfft((even - even.mean()) * np.hanning(len(even)), padded))
+    rate = (len(t) - 1) / t[-1]
+    coarse = float(np.argmax(spectrum)) * rate / padded
+    if coarse * t[-1] < 1.5:
+        got = f"{coarse * t[-1]:.2f} periods"
+        raise InputError(Fault("", "waveform", got, "1.5 periods or more", "Record a longer trace"))
+
+    def solve(f: float) -> tuple[Array, Array]:
+        angle = 2.0 * math.pi * f * t
+        columns = [np.ones_like(t)] + [g(k * angle) for k in (1, 3, 5) for g in (np.cos, np.sin)]
+        basis = np.column_stack(columns)
+        c = np.linalg.lstsq(basis, v, rcond=None)[0]
+        return c, v - basis @ c
+
+    span = 0.5 / t[-1]
+    best = minimize_scalar(
+        lambda f: float(np.sum(solve(f)[1] ** 2)), bounds=(max(coarse - span, 0.1 * coarse), coarse + span),
+        method="bounded", options={"xatol": 1e-9 * coarse},
+    )  # fmt: skip
+    f = float(best.x)
+    c, rest = solve(f)
+    sizes = [math.hypot(c[1 + 2 * k], c[2 + 2 * k]) for k in range(3)]
+    sd = float(np.sqrt(rest @ rest / max(len(t) - 8, 1)))
+    return Waveform(f, sizes[0], float(c[0]), (sizes[1] / sizes[0], sizes[2] / sizes[0]), sd)
+
+
 # Do the methods agree on the motor constant and, if not, which systematic error explains it?
 #
 # Data are the constant of the data sheet and slope and intercept of the back-EMF and of the torque trials, with their

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -39,6 +40,7 @@ class MotorHead(Table):
     kv_tolerance_pct: float | None = entry("half-width, stated or assumed; unknown if omitted", _PCT)
     kv_measure: Volt = entry("voltage measure that K_v refers to", default="peak")
     kv_between: Between = entry("where that voltage is measured", default="line")
+    pole_pairs: int | None = entry("required with waveforms", low=1, high=60)
     data: str = entry("description of the trials", default="")
     source: str | None = entry("source of the trials")
 
@@ -61,10 +63,20 @@ class ResultTable(Table):
 class BackEmfTable(Table):
     """[back_emf]: generator trials."""
 
-    file: str = entry("columns trial, rpm, one in V", required=True)
-    measure: Volt = entry("voltage measure in the column in V", required=True)
+    file: str | None = entry("columns trial, rpm, one in V")
+    waveforms: tuple[str, ...] | None = entry("oscilloscope traces, one trial each")
+    measure: Volt | None = entry("voltage measure in the column in V")
     between: Between = entry("where it is measured", required=True)
     u_gain_pct: float | None = entry("standard uncertainty common to all trials", _PCT)
+
+    def rules(self) -> Iterable[tuple[str, ...]]:
+        """One way; a column needs its measure."""
+        if (self.file is None) == (self.waveforms is None):
+            yield "", "both or neither of file, waveforms", "one of them"
+        elif self.file is not None and self.measure is None:
+            yield "measure", "nothing", f"one of {', '.join(get_args(Volt))}", "peak_to_peak is twice the peak"
+        elif self.waveforms is not None and len(self.waveforms) < 3:
+            yield "waveforms", f"{len(self.waveforms)} traces", "3 or more"
 
 
 class TorqueTable(Table):
@@ -107,15 +119,19 @@ class MotorToml(Table):
     stated: tuple[StatedTable, ...] = ()
 
     def rules(self) -> Iterable[tuple[str, ...]]:
-        """One method or more."""
+        """One method or more; waveforms need the pole pairs."""
         if self.back_emf is None and self.torque is None and self.motor.kv_rpm_V is None:
             yield "", "no method", "motor.kv_rpm_V, [back_emf] or [torque]"
+        if self.back_emf is not None and self.back_emf.waveforms and self.motor.pole_pairs is None:
+            yield "motor.pole_pairs", "nothing", "a whole number, for waveforms"
 
     @property
     def files(self) -> dict[str, str]:
         """Names of the recordings by key."""
-        tables = {"back_emf": self.back_emf, "torque": self.torque}
-        return {f"{name}.file": table.file for name, table in tables.items() if table}
+        emf, torque = self.back_emf, self.torque
+        named = {"back_emf.file": emf and emf.file, "torque.file": torque and torque.file}
+        named |= {f"back_emf.waveforms[{i}]": name for i, name in enumerate((emf and emf.waveforms) or ())}
+        return {where: name for where, name in named.items() if name}
 
     @property
     def gains(self) -> dict[str, float | None]:
@@ -151,7 +167,7 @@ def read(path: str | Path) -> MotorTrials:
     faults: list[Fault] = []
     emf = torque = loop = None
     with gathered(faults):
-        emf = None if emf_table is None else _back_emf(file, emf_table, winding)
+        emf = None if emf_table is None else _back_emf(file, emf_table, winding, motor.pole_pairs)
     with gathered(faults):
         if torque_table is not None:
             torque, loop = _torque(file, torque_table, winding)
@@ -197,10 +213,21 @@ def _columns(path: Path, units: tuple[str, ...]) -> tuple[Array, ...]:
     return columns
 
 
-def _back_emf(file: Path, table: BackEmfTable, winding: str) -> mc.Line:
-    trial, rpm, volts = _columns(file.parent / table.file, ("rpm", "V"))
-    line = mc.line(rpm * 2.0 * math.pi / 60.0, volts, trial)
-    return line.scaled(1.0 / mc.voltage_factor(table.measure, table.between, winding))
+def _back_emf(file: Path, table: BackEmfTable, winding: str, pole_pairs: int | None) -> mc.Line:
+    if table.file is not None and table.measure is not None:
+        trial, rpm, volts = _columns(file.parent / table.file, ("rpm", "V"))
+        line = mc.line(rpm * 2.0 * math.pi / 60.0, volts, trial)
+        return line.scaled(1.0 / mc.voltage_factor(table.measure, table.between, winding))
+    names = table.waveforms or ()
+    waves = [mc.fit_waveform(*read_waveform(file.parent / name)) for name in names]
+    omega = np.array([2.0 * math.pi * w.frequency_Hz / (pole_pairs or 1) for w in waves])
+    peak = np.array([w.amplitude_V for w in waves]) / mc.voltage_factor("peak", table.between, winding)
+    if len(np.unique(np.round(omega, 1))) >= 3:
+        return mc.line(omega, peak, np.arange(len(waves)))
+    each = peak / omega  # all at one speed: an offset of the amplitude cannot be told
+    u2 = float(np.var(each, ddof=1)) / len(each) * (len(each) - 1) / max(len(each) - 3, 0.5)
+    cov = np.diag([u2, (10.0 * float(peak.max())) ** 2])
+    return mc.Line(float(each.mean()), 0.0, cov, each, np.full(len(each), math.nan), names)
 
 
 def _torque(file: Path, table: TorqueTable, winding: str) -> tuple[mc.Line, mc.TorqueLoop]:
@@ -215,6 +242,38 @@ def _torque(file: Path, table: TorqueTable, winding: str) -> tuple[mc.Line, mc.T
         raise InputError(fault)
     line = mc.line(amps, loop.torque(volts), trial)
     return line.scaled(mc.current_factor(table.current, table.between, winding) / 1.5), loop
+
+
+def read_waveform(path: Path) -> tuple[Array, Array]:
+    """Read an oscilloscope's CSV."""
+    source = importers.load_text(path)
+    split = [[c.strip().strip('"') for c in re.split(r"[,;\t]", line)] for line in source.lines if line.strip()]
+    start = next((i for i, c in enumerate(split) if _pair(c, 0)), None)
+    at = 0
+    if start is None or any(_pair(c, 3) for c in split[:3]):
+        start, at = next((i for i, c in enumerate(split) if _pair(c, 3)), None), 3
+    if start is None:
+        raise InputError(Fault(source.name, "", "no two columns of numbers", "time and voltage"))
+    words = " ".join(" ".join(c) for c in (split[:20] if at == 3 else split[:start]))
+    scale = [_scale(words, r"(?:s|sec|seconds?)", 1.0), _scale(words, r"(?:v|volts?)", 1.0)]
+    if None in scale:
+        hint = "Keep the heading lines of the oscilloscope, or write Time (s),CH1 (V)"
+        raise InputError(Fault(source.name, "", "no units of time and voltage", "seconds and volts in a heading", hint))
+    rows = [c for c in split[start:] if _pair(c, at)]
+    data = np.array([[float(c[at]), float(c[at + 1])] for c in rows])
+    return data[:, 0] * float(scale[0] or 1.0), data[:, 1] * float(scale[1] or 1.0)
+
+
+def _pair(cells: list[str], at: int) -> bool:
+    return len(cells) > at + 1 and all(importers.number(c) is not None for c in cells[at : at + 2])
+
+
+def _scale(words: str, unit: str, one: float) -> float | None:
+    """Factor to SI of a unit among words, with a prefix; None when it is not there."""
+    for prefix, factor in (("m", 1e-3), ("[uµμ]", 1e-6), ("n", 1e-9), ("", one)):
+        if re.search(rf"(?<![A-Za-z]){prefix}{unit}(?![A-Za-z])", words, re.IGNORECASE):
+            return factor
+    return None
 
 
 RESULTS = ("motor.json", "trials.csv", "motor.png")
