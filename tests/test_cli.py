@@ -170,6 +170,7 @@ WRONG = [
     (["swep", "cases"], "Did you mean sweep?"),
     (["sweep", "cases", "--tolerence-pct", "3"], "Did you mean --tolerance-pct?"),
     (["diagnose", "a.csv", "--baseline", "bemr"], "Did you mean bemt?"),
+    (["sweep", "cases", "--engine", "loca"], "Did you mean local?"),
     (["validate"], "--folders: got none; expected one or more."),
     (["fetch"], "the following arguments are required: KIND."),
     (["plan", "c", "--case", "a", "--case", "b"], "argument --case: got it twice; expected it once"),

@@ -472,6 +472,7 @@ def test_every_imported_library_is_declared(project: Path) -> None:
     # what comes with a declared library, and has no version of its own to ask for
     comes_with = {
         "ocp": "cadquery",
+        "distributed": "dask",
         "pil": "matplotlib",
         "pydantic_core": "pydantic",
         "python_calamine": "python-calamine",  # its name when it is imported

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-ABSENT = ("cadquery", "OCP", "trimesh", "manifold3d", "pyvista", "vtk", "vtkmodules",
+ABSENT = ("cadquery", "OCP", "trimesh", "manifold3d", "pyvista", "vtk", "vtkmodules", "dask", "distributed",
           "xarray", "psutil", "sklearn")  # fmt: skip
 
 
@@ -39,6 +39,7 @@ def bemt(env: dict[str, str], cwd: Path, *words: str) -> subprocess.CompletedPro
     [
         (("export", "cases/prop_8x5", "--out", "o", "--format", "step"), "cad"),
         (("stations", "lump.stl", "--unit", "mm"), "cad"),
+        (("sweep", "cases/prop_8x5", "--engine", "dask"), "dask"),
     ],
 )
 def test_a_missing_extra_is_named_with_the_line_that_installs_it(

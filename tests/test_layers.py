@@ -80,7 +80,9 @@ MAY: dict[str, set[str]] = {
     "bemt.data.recordings.load": {"files"},
     "bemt.rotors.k1k2_points|bemt.rotors.k1k2_calibration": {"files"},
     "bemt.data.recordings.cfd_files|bemt.data.recordings.cfd_options|bemt.data.recordings.cfd_run": {"files"},
-    "bemt.results.sweep.grid|bemt.results.sweep.store|bemt.rotors.validate.points": {"files"},
+    "bemt.results.sweep.grid|bemt.results.sweep.dask_engine|bemt.results.sweep.store|bemt.rotors.validate.points": {
+        "files"
+    },
     "bemt.results.sweep.batch": {"files", "environment"},
     "bemt.judge.diagnose.figures|bemt.judge.diagnose.folder|bemt.judge.diagnose.rotor_calibration": {"files"},
     "bemt.judge.diagnose.fit": {"files"},
@@ -114,7 +116,7 @@ UNSEEN = "|".join(
 )
 
 HEAVY = {
-    "OCP", "aerosandbox", "cadquery", "casadi", "jinja2", "manifold3d", "matplotlib",
+    "OCP", "aerosandbox", "cadquery", "casadi", "dask", "distributed", "jinja2", "manifold3d", "matplotlib",
     "neuralfoil", "pandas", "pyarrow", "pyvista", "scipy", "sklearn", "trimesh", "vtk", "vtkmodules", "wisdem",
 }  # fmt: skip
 LIGHT = "|".join((

@@ -31,7 +31,6 @@ from bemt.results.sweep import batch as sweep_module
 from bemt.results.sweep import grid as grid_module
 from bemt.results.sweep.answer import summary as summary_of
 from bemt.results.sweep.case import solve_case
-from bemt.results.sweep.grid import Grid, GridSolver
 from bemt.results.sweep.rows import Comparison, Result
 from bemt.rotors.case import load_case
 from bemt.rotors.case.prepare import prepare_case
@@ -869,35 +868,3 @@ def test_names_that_would_share_a_file_are_refused(tmp_path: Path) -> None:
         "name: got 'Sweep.JSON'; expected another name. The sweep writes a file of that name.",
     ]
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["one", "sweep.csv", "sweep.json", "sweep.txt"]
-
-
-def test_states_of_the_air_are_forgotten_and_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    extra = "[sweep]\nrpm = [3000, 6000]\naltitude_m = {start = 0, stop = 3000, num = 40}\npitch_in = [4, 5, 6]\n"
-    case = load_case(make_case(tmp_path / "cases", extra=extra))
-    grid = Grid.of(case)
-    assert grid is not None
-    whole = grid_module.solve_chunk(GridSolver(case, grid), 0)
-    monkeypatch.setattr(grid_module, "MAX_AIRS", 7)
-    few = GridSolver(case, grid)
-    assert grid_module.solve_chunk(few, 0) == whole
-    assert 0 < len(few._airs) <= 7
-
-
-@pytest.mark.slow
-def test_ten_million_points_stay_below_two_gigabytes(tmp_path: Path) -> None:
-    import psutil
-
-    axes = "rpm = {start = 3000, stop = 9000, num = 10000}\nairspeed_m_s = {start = 0, stop = 10, num = 1000}\n"
-    path = make_case(tmp_path / "cases", extra=f"[sweep]\n{axes}")
-    command = [sys.executable, "-m", "bemt", "sweep", str(path), "--out", str(tmp_path / "out"), "--quiet"]
-    process = psutil.Popen(command, env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])})
-    peak = 0
-    while process.poll() is None:
-        try:
-            peak = max(peak, process.memory_info().rss)
-        except psutil.Error:  # it has just ended
-            break
-        time.sleep(0.2)
-    assert process.wait() == 0
-    assert 0 < peak < 2e9
-    assert json.loads((tmp_path / "out" / "sweep.json").read_text())["cases"][0]["grid"]["points"] == 10_000_000

@@ -15,7 +15,8 @@ import json
 import os
 import tempfile
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from importlib import resources
 from importlib.util import find_spec
@@ -79,6 +80,7 @@ Arrays = dict[str, np.ndarray]
 
 MEMORY_ENTRIES = 256
 _memory: OrderedDict[str, Arrays] = OrderedDict()
+_watched: list[dict[tuple[str, str], Arrays]] = []
 
 
 def cache_dir() -> Path | None:
@@ -137,6 +139,8 @@ def cached_arrays(kind: str, key: str, make: Callable[[], Arrays]) -> Arrays:
     found = _memory.get(name)
     if found is not None:
         _memory.move_to_end(name)
+        for watched in _watched:
+            watched[kind, key] = found
         return found
     folder = cache_dir()
     path = None if folder is None else folder / kind / f"{key}.npz"
@@ -150,7 +154,26 @@ def cached_arrays(kind: str, key: str, make: Callable[[], Arrays]) -> Arrays:
     _memory[name] = arrays
     while len(_memory) > MEMORY_ENTRIES:
         _memory.popitem(last=False)
+    for watched in _watched:
+        watched[kind, key] = arrays
     return arrays
+
+
+@contextmanager
+def used() -> Iterator[dict[tuple[str, str], Arrays]]:
+    """Collect the entries that are asked for, so that another process can be given them.
+
+    >>> with used() as entries:
+    ...     _ = cached_arrays("doctest", "0" * 64, lambda: {"v": np.arange(2.0)})
+    >>> list(entries) == [("doctest", "0" * 64)]
+    True
+    """
+    entries: dict[tuple[str, str], Arrays] = {}
+    _watched.append(entries)
+    try:
+        yield entries
+    finally:
+        _watched[:] = [held for held in _watched if held is not entries]
 
 
 def shipped_arrays(package: str, file: str) -> Arrays:
@@ -162,6 +185,11 @@ def shipped_arrays(package: str, file: str) -> Arrays:
 def always_compile() -> bool:
     """Whether ``BEMT_COMPILE=always`` asks for compiled code even for a few points: equal to the last bit."""
     return os.environ.get("BEMT_COMPILE", "") == "always"
+
+
+def watched() -> bool:
+    """Whether somebody collects the entries that are asked for (:func:`used`)."""
+    return bool(_watched)
 
 
 def is_installed(package: str) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from bemt.base.action import Count, Told, action
 
@@ -23,7 +23,9 @@ __all__ = ["effects", "report", "sweep"]
 )  # fmt: skip
 def sweep(
     cases: Path | Sequence[Path] = ".", *, out: Path | None = None, jobs: Count | None = None, strict: bool = False,
-    tolerance_pct: float | None = None, resume: bool = True, progress: Callable[[str], None] | None = None,
+    tolerance_pct: float | None = None, resume: bool = True, engine: Literal["local", "dask"] = "local",
+    scheduler: str | None = None,
+    progress: Callable[[str], None] | None = None,
 ) -> SweepAnswer:  # fmt: skip
     """Solve cases and compare them with recorded values.
 
@@ -34,13 +36,17 @@ def sweep(
     out : path, optional
         Folder for tables, grids and sweep.json; the sweep resumes from it.
     jobs : int, optional
-        Solve so many cases in parallel; by default one case, its grid on all cores.
+        Solve so many cases in parallel; by default one case, its grid on all cores. With dask: local workers.
     strict : bool
         End with 1 if a point is unconverged or BEMT differs from a reference by more than the tolerance.
     tolerance_pct : float, optional
         Thrust tolerance of strict, percent of the reference; 15 by default. [%]
     resume : bool
         Reuse results found in the folder.
+    engine : {"local", "dask"}
+        Where to solve grids: this machine or a Dask cluster; the results are identical.
+    scheduler : str, optional
+        With dask: an existing cluster such as tcp://host:8786; processes on this machine by default.
     progress : callable, optional
         Called with a line of text.
 
@@ -72,7 +78,8 @@ def sweep(
         raise InputError(Fault("", "--tolerance-pct", f"{tolerance:g}", "--strict, which ends with 1 beyond it"))
     return run(
         paths_text("cases", cases), None if out is None else path_text("out", out), jobs=jobs, resume=resume,
-        progress=progress or (lambda line: None), tolerance=tolerance if strict else None,
+        progress=progress or (lambda line: None), engine=engine, scheduler=scheduler,
+        tolerance=tolerance if strict else None,
     )  # fmt: skip
 
 

@@ -152,6 +152,8 @@ def _confident_range(alpha: Array, cl: Array, confidence: Array, past_stall: flo
 def neuralfoil_polar(airfoil: Airfoil, n_crit: float = rule.N_CRIT, drag_level: float = rule.DRAG_LEVEL) -> Polar:
     """Section table of a propeller blade by the general rule (:mod:`bemt.physics.sections.rule`), kept."""
     key = airfoil.key(), airfoil.name, airfoil.four_digit, float(n_crit), float(drag_level)
+    if cache.watched():  # whoever collects the tables that are used is to see them
+        return _by_rule(airfoil, n_crit, drag_level)
     return _POLARS.get(key, lambda: _by_rule(airfoil, n_crit, drag_level))
 
 

@@ -9,19 +9,20 @@ otherwise it is removed before the case is solved. So a case that fails has no r
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import re
 import signal
 import threading
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import nullcontext, suppress
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import bemt
-from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
+from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, refuse, system_fault
 from bemt.base.tables import plain, remove_stale
 from bemt.base.toml_text import Collector
 from bemt.results.sweep import store
@@ -29,6 +30,9 @@ from bemt.results.sweep.case import solve_case
 from bemt.results.sweep.rows import Result, Sweep
 from bemt.results.sweep.store import SCHEMA, fingerprint
 from bemt.rotors.case import Case, check_name, find_cases, load_case, repeated_names
+
+if TYPE_CHECKING:
+    from bemt.results.sweep.grid import Engine
 
 __all__ = ["SCHEMA", "fingerprint", "off_tolerance", "sweep"]
 
@@ -70,8 +74,9 @@ def _failed(path: Path, error: BaseException, name: str = "") -> Result:
 
 
 def run_case(
-    ready: Ready, out: Path | None, resume: bool, threads: int, progress: Callable[[float, str], None] | None = None
-) -> Result:
+    ready: Ready, out: Path | None, resume: bool, threads: int, progress: Callable[[float, str], None] | None = None,
+    engine: Engine | None = None,
+) -> Result:  # fmt: skip
     """Do everything for one case; never raises but for an interrupt."""
     tell = progress or (lambda share, what: None)
     case, mark = ready
@@ -92,7 +97,9 @@ def run_case(
         if case.axes():
             from bemt.results.sweep.grid import run_grid
 
-            grid = run_grid(case, folder, mark, threads, lambda i, n: tell(0.5 + 0.5 * i / n, f"grid {i}/{n}"), resume)
+            grid = run_grid(
+                case, folder, mark, threads, lambda i, n: tell(0.5 + 0.5 * i / n, f"grid {i}/{n}"), resume, engine
+            )
         result = Result.from_document(plain(replace(result, grid=grid).document()))  # as it will be read back
         if fingerprint(case.content_hash()) != mark:  # no telling which of them the numbers are of
             if folder is not None:
@@ -125,16 +132,16 @@ def _follow_parent() -> None:
 
 
 def _results(
-    cases: Sequence[Ready], out: Path | None, resume: bool, jobs: int | None, bar: Progress
-) -> Iterator[tuple[int, Result]]:
+    cases: Sequence[Ready], out: Path | None, resume: bool, jobs: int | None, bar: Progress, engine: Engine | None,
+) -> Iterator[tuple[int, Result]]:  # fmt: skip
     """Results in the order in which they come."""
-    if jobs is None or jobs == 1 or len(cases) == 1:  # one process; its grid may use all cores
+    if engine is not None or jobs is None or jobs == 1 or len(cases) == 1:  # one process; its grid may use all cores
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-        threads = cores if jobs is None else jobs
+        threads = cores if jobs is None or engine is not None else jobs
         for i, ready in enumerate(cases):
             at = f"[{i + 1}/{len(cases)}] {ready[0].name}"
             tell = lambda s, what, at=at: bar(f"{at} {_bar(s)} {what}")  # noqa: E731
-            yield i, run_case(ready, out, resume, threads, tell)
+            yield i, run_case(ready, out, resume, threads, tell, engine)
         return
     args = (out, resume, 1, None)
     lost = []
@@ -185,9 +192,11 @@ def _bar(share: float) -> str:
 
 def sweep(
     paths: Sequence[str | Path], out: str | Path | None = None, *, jobs: int | None = None, resume: bool = True,
-    progress: Progress | None = None, beside: Sequence[Path] = (),
+    progress: Progress | None = None, engine: str = "local", scheduler: str | None = None,
+    beside: Sequence[Path] = (),
 ) -> Sweep:  # fmt: skip
     """Solve cases; `beside`, CFD runs that stand beside each of them."""
+    _check_options(engine, scheduler, jobs)
     files = find_cases(paths)
     folder = None if out is None else Path(out)
     if folder is not None:
@@ -195,14 +204,21 @@ def sweep(
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(Fault(str(out), "", error.strerror or "no folder", "a folder for results")) from error
-    with nullcontext() if folder is None else store.locked(folder):
+    with ExitStack() as stack:
+        if folder is not None:
+            stack.enter_context(store.locked(folder))
+        on: Engine | None = None
+        if engine == "dask":
+            from bemt.results.sweep.dask_engine import Cluster
+
+            on = stack.enter_context(Cluster(scheduler, jobs))
         if folder is not None:
             store.clear_overview(folder)
         ready, found = _read(files, folder, tuple(beside))
         todo = list(ready)
         tell = progress or (lambda line: None)
         left = [ready[i] for i in todo]
-        for i, result in _results(left, folder, resume, jobs, tell) if left else ():
+        for i, result in _results(left, folder, resume, jobs, tell, on) if left else ():
             found[todo[i]] = result
         results = tuple(found[i] for i in range(len(files)))
         code = max((r.exit_code for r in results), default=EXIT_OK)
@@ -210,6 +226,21 @@ def sweep(
         if folder is not None:
             store.keep_overview(folder, swept)
     return swept
+
+
+def _check_options(engine: str, scheduler: str | None, jobs: int | None) -> None:
+    """Refuse options of the grid that do not fit together, all at once."""
+    faults = []
+    if engine not in ("local", "dask"):
+        faults.append(Fault("", "--engine", repr(engine), "local or dask"))
+    if scheduler is not None and engine == "local":
+        faults.append(Fault("", "--scheduler", scheduler, "nothing with --engine local", "Add --engine dask"))
+    if scheduler is not None and jobs is not None:
+        expected = "nothing with --scheduler, whose cluster has its workers"
+        faults.append(Fault("", "--jobs", str(jobs), expected, "Leave it out"))
+    refuse(faults)
+    if engine == "dask":
+        require_extra("--engine dask", "dask", "distributed")
 
 
 def _read(
@@ -259,3 +290,11 @@ def off_tolerance(result: Result, tolerance: float) -> list[str]:
     if grid and grid.unconverged:
         reasons.append(f"{result.name}: {grid.unconverged} of {grid.points} grid points unconverged")
     return reasons
+
+
+def require_extra(option: str, *modules: str) -> None:
+    """Refuse an option whose optional packages are not installed."""
+    missing = [name for name in modules if importlib.util.find_spec(name) is None]
+    if missing:
+        expected = "the optional packages of the extra 'dask'"
+        raise InputError(Fault("", option, f"no {' and no '.join(missing)}", expected, "pip install 'bemt[dask]'"))

@@ -2,7 +2,7 @@
 
 Rows run over the axes in the order geometry (pitch, diameter, gap), air, rpm, airspeed, angle, the last one fastest.
 The grid is cut into chunks whose edges depend on the axes alone, and a chunk depends on nothing but its number; each
-finished chunk is a file, so an interrupted run goes on where it stopped and gives the same bytes.
+finished chunk is a file, so an interrupted run goes on where it stopped and gives the same bytes, whoever solves them.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ import hashlib
 import json
 import math
 import shutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -147,6 +148,11 @@ class Grid:
         return -(-self.size // self.chunk)
 
 
+Solved = tuple[int, bytes, Statistics]
+Engine = Callable[[Case, Grid, Sequence[int], bool], Generator[Solved]]
+"""Solves chunks: (case, grid, numbers, whether rows are wanted) to (number, bytes, statistics) in whatever order."""
+
+
 class GridSolver:
     """Evaluates stretches of a grid, rows or statistics only; remembers the last geometry and states of the air."""
 
@@ -220,6 +226,18 @@ def solve_chunk(solver: GridSolver, number: int) -> tuple[bytes, Statistics]:
     return encode(block) if solver.rows else b"", told
 
 
+def _here(threads: int) -> Engine:
+    """Engine in this process."""
+
+    def solve(case: Case, grid: Grid, numbers: Sequence[int], rows: bool) -> Generator[Solved]:
+        solver = GridSolver(case, grid, threads, rows) if numbers else None
+        for number in numbers:
+            assert solver is not None
+            yield number, *solve_chunk(solver, number)
+
+    return solve
+
+
 def _merge(statistics: list[Statistics]) -> Statistics:
     ends = []
     for name in STATISTICS:
@@ -230,7 +248,7 @@ def _merge(statistics: list[Statistics]) -> Statistics:
 
 def run_grid(
     case: Case, folder: Path | None, fingerprint: str, threads: int = 1,
-    progress: Callable[[int, int], None] | None = None, resume: bool = True,
+    progress: Callable[[int, int], None] | None = None, resume: bool = True, engine: Engine | None = None,
 ) -> GridResult | None:  # fmt: skip
     """Solve the grid of a case."""
     grid = Grid.of(case)
@@ -258,16 +276,15 @@ def run_grid(
             if found is not None:
                 count(number, found)
     todo = [number for number in range(grid.chunks) if number not in statistics]
-    solver = GridSolver(case, grid, threads, parts is not None)
-    for number in todo:
-        data, made = solve_chunk(solver, number)
-        if parts is not None:
-            path = _part(parts, number)
-            write_atomic(path, data)
-            told = plain(made.document())
-            record = {"statistics": told, "sha256": _seal(data, told)}
-            write_atomic(path.with_suffix(".json"), json.dumps(record))
-        count(number, made)
+    with closing((engine or _here(threads))(case, grid, todo, parts is not None)) as solved:
+        for number, data, made in solved:
+            if parts is not None:
+                path = _part(parts, number)
+                write_atomic(path, data)
+                told = plain(made.document())
+                record = {"statistics": told, "sha256": _seal(data, told)}
+                write_atomic(path.with_suffix(".json"), json.dumps(record))
+            count(number, made)
     digest = None
     names = (*grid.names, *_columns(case), "converged")
     if folder is not None and parts is not None:

@@ -184,7 +184,7 @@ def prepare_case(
     if not alone:
         case.one_rotor_only()
     told = case.file.blade.as_built
-    if case.file.polars or (told is not None and told.file is not None):
+    if case.file.polars or (told is not None and told.file is not None) or cache.watched():
         return _model(case, n_stations)  # of files that may have changed
     return case.once(("model", n_stations), lambda: _model(case, n_stations))
 
