@@ -579,7 +579,7 @@ def test_a_unit_that_is_named_is_stated_next(tmp_path: Path) -> None:
     assert f"--unit torque=Ncm --out {kept}" in text and f"bemt diagnose {kept} --case 12x6" in text
 
 
-def test_watts_of_nobody_knows_what_are_asked_about_before_a_torque_cell(tmp_path: Path) -> None:
+def test_power_that_may_be_electrical_is_asked_about_before_a_torque_cell(tmp_path: Path) -> None:
     """Electrical watts under "Power (W)": torque is a third too high, and no cell has a fault."""
     p = bemt.propeller("9x6E")
     found = p.solve(np.arange(3000.0, 9001.0, 1000.0), J=np.zeros(7), bands=False)
