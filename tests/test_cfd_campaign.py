@@ -242,8 +242,11 @@ def test_a_campaign_is_recorded(
 
 def _alive(pid: int) -> bool:
     """Whether a process runs; one that only waits to be collected does not."""
-    stat = Path(f"/proc/{pid}/stat")
-    return stat.is_file() and stat.read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    try:
+        stat = Path(f"/proc/{pid}/stat").read_text()
+    except (FileNotFoundError, ProcessLookupError):  # it may end between opening and reading
+        return False
+    return stat.rsplit(")", 1)[1].split()[0] != "Z"
 
 
 def test_a_killed_campaign_goes_on(project: Path, tmp_path: Path, programs: Path) -> None:
