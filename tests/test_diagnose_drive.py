@@ -27,18 +27,28 @@ def run(seed: int, factor: float = 1.0, bow: float = 0.0, volts: float = np.nan)
     return from_series(replace(series, values={**series.values, **more}), case())
 
 
-@pytest.mark.parametrize("seed", [4, pytest.param(5, marks=pytest.mark.slow)])
-def test_the_scatter_of_a_speed_follows_nothing(seed: int) -> None:
-    """Five pulse widths, again and again: readings of 0.1 % are no law over the speed that was read."""
-    pulse = np.tile(np.linspace(0.0014, 0.0019, 5), 12)
+def long(seed: int, hot: float = 0.0) -> Record:
+    """Five pulse widths, again and again, in 40 min; the share of the speed that a hot motor loses."""
+    pulse, t = np.tile(np.linspace(0.0014, 0.0019, 5), 12), 40.0 * np.arange(60)
     share = (pulse - 0.001) / 0.001
     rpm = 24000.0 * share / (1.0 + 0.25 * share) * (1.0 + 0.001 * np.random.default_rng(seed).standard_normal(60))
-    given = {
-        "rpm": rpm, "airspeed_m_s": np.zeros(60), "density_kg_m3": np.full(60, 1.225), "time_s": 40.0 * np.arange(60),
-    }  # fmt: skip
+    rpm *= 1.0 - hot * (1.0 - np.exp(-t / 300.0))
+    given = {"rpm": rpm, "airspeed_m_s": np.zeros(60), "density_kg_m3": np.full(60, 1.225), "time_s": t}
     series = recording(case(), given, seed=seed)
-    said = chain.diagnose([from_series(replace(series, values={**series.values, "pwm_s": pulse}), case())], [case()])
+    return from_series(replace(series, values={**series.values, "pwm_s": pulse}), case())
+
+
+@pytest.mark.parametrize("seed", [4, pytest.param(5, marks=pytest.mark.slow)])
+def test_the_scatter_of_a_speed_follows_nothing(seed: int) -> None:
+    """Readings of 0.1 % are no law over the speed that was read."""
+    said = chain.diagnose([long(seed)], [case()])
     assert said.systems["drive"]["verdict"] == "none"
+
+
+def test_what_loads_would_show_counts_in_the_speed() -> None:
+    """Loads grow with the square of the speed: half of what counts in them counts in it."""
+    said = chain.diagnose([long(2, hot=0.006), replace(long(1), reference=True)], [case()])
+    assert "motor_heating" in said.systems["drive"]["effects"]
 
 
 @pytest.fixture(scope="module")

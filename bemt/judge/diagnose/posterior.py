@@ -23,6 +23,7 @@ from bemt.base.gaussian.whitening import conditional
 from bemt.judge.diagnose import form, knowledge, noise
 from bemt.judge.diagnose.form import State
 from bemt.judge.diagnose.other_rotor import Another
+from bemt.judge.diagnose.record import CHANNELS
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation
 from bemt.physics import effects
 from bemt.physics.effects import base as effect_base
@@ -34,9 +35,10 @@ if TYPE_CHECKING:
     from bemt.judge.diagnose.signatures import Candidate
 
 LEAST = 0.01
-"""What changes every channel by less than this share of its size counts as no cause, known or unknown [1]."""
+"""What changes no load by more than this share of its size, where it changes it, is no cause, known or unknown [1]."""
 EARNED = 3.0
 """Log odds that a second effect must add to the better one of a pair; below, the pair counts as that one [1]."""
+_TOUCHED = 0.1  # share of that which a reading changes by at least where an effect is at work in it [1]
 # Settings of the covariance that are kept, settings of an effect that choose them, and settings of each effect in a
 # pair: evenly chosen and best; pairs with the errors of both laws.
 _KEEP, _FEW, _EVEN, _BEST, _PAIRS = 3, 9, 14, 10, 12
@@ -118,10 +120,7 @@ class _Bank:
         spans = {c.id: slice(int(a), int(b)) for c, a, b in zip(candidates, ends, ends[1:], strict=False)}
         S = np.concatenate([np.zeros((problem.y.size, 0)), *(c.signatures for c in candidates)], axis=1)
         log_w = np.concatenate([np.zeros(0), *(np.log(c.weight) for c in candidates)])
-        seen = np.zeros(log_w.size, dtype=bool)
-        for k in np.unique(problem.channel[problem.changed]):
-            mine = problem.changed & (problem.channel == k)
-            seen |= np.sqrt(np.mean((S[mine] / problem.scale[mine, None]) ** 2, axis=0)) > LEAST
+        seen = _counts(problem, problem.changed, S[problem.changed])
         return cls(problem, tuple(candidates), spans, S, log_w, seen, form.form_modes(problem, candidates), {})
 
     def columns(self, name: str, setting: int) -> tuple[int, Array]:
@@ -211,10 +210,24 @@ def _noticed(
     """Which rivals, as the readings show them, change any channel by as much as counts, (K,)."""
     out = []
     for k, (given, white) in zip(rivals, beside, strict=True):
-        change = k.size**2 * k.kernel @ white.solve(given.rest(problem.residual)) / problem.scale[k.mine]
-        channel = problem.channel[k.mine]
-        out.append(max(float(np.sqrt(np.mean(change[channel == c] ** 2))) for c in np.unique(channel)) > LEAST)
+        change = k.size**2 * k.kernel @ white.solve(given.rest(problem.residual))
+        out.append(_counts(problem, k.mine, change[:, None])[0])
     return np.array(out)
+
+
+def _counts(problem: Problem, rows: NDArray[np.bool_], changes: Array) -> NDArray[np.bool_]:
+    """Which changes (N, K) of some readings are as large as counts in any channel, over the readings that they change.
+
+    Loads grow with the square of the speed: half of what counts in loads counts in the speed at a pulse width.
+    """
+    channel = problem.channel[rows]
+    share = np.abs(changes) / (problem.scale[rows] * np.where(channel == CHANNELS.index("rpm"), 0.5, 1.0))[:, None]
+    there = share > _TOUCHED * LEAST
+    out = np.zeros(share.shape[1], dtype=bool)
+    for c in np.unique(channel):
+        mine = channel == c
+        out |= np.sum(share[mine] ** 2, axis=0, where=there[mine]) > LEAST**2 * np.sum(there[mine], axis=0)
+    return out
 
 
 def _own_variables() -> dict[str, str]:
