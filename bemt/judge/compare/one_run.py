@@ -240,8 +240,8 @@ def _point(cfd: Dataset, bemt: Dataset, i: int, k: int) -> PointOfRun:
         share, u = float(cfd.duct_thrust_N[i]) / T, float(cfd.u_duct_thrust_N[i]) / abs(T)
         loads["duct_share"] = _load(share, u, bemt, "duct_share", k)
     rpm, V, rho = (float(cfd[key][i]) for key in ("rpm", "airspeed_m_s", "density_kg_m3"))
-    J = V / (rpm / 60.0) if rpm > 0 else math.nan
-    return PointOfRun(cfd.labels[i] if cfd.labels else "", rpm, V, rho, J, loads, tuple(bemt.flags[k]))
+    per_turn = V / (rpm / 60.0) if rpm > 0 else math.nan
+    return PointOfRun(cfd.labels[i] if cfd.labels else "", rpm, V, rho, per_turn, loads, tuple(bemt.flags[k]))
 
 
 def _load(value: float, u: float, bemt: Dataset, name: str, k: int) -> BothLoads:

@@ -26,6 +26,7 @@ class TipCut(Effect):
 
     id = "tip_cut"
     geometric = True
+    evident = True
     title = "blades shorter than stated"
     sign = "less thrust and even less torque at every speed; the advance ratio of zero thrust barely moves"
     check = "measure the diameter"
