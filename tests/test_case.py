@@ -270,12 +270,13 @@ def test_a_script_gives_the_thrust_of_the_case(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("make", "got"),
-    [(lambda p: p / "nothing", "no such file or folder"), (lambda p: p, "no case")],
+    [(lambda p: p / "prop_8x5", "no such file or folder"), (lambda p: p, "no case")],
 )
 def test_paths_without_a_case(tmp_path: Path, make: object, got: str) -> None:
     with pytest.raises(InputError) as caught:
         find_cases([make(tmp_path)])  # type: ignore[operator]
     assert [fault.got for fault in caught.value.faults] == [got]
+    assert "A label?" not in caught.value.faults[0].hint, "`new` takes no path"
 
 
 def test_fault_reads_as_a_sentence() -> None:

@@ -90,7 +90,9 @@ def test_derive_at_zero_rpm_is_nan_not_zero() -> None:
     assert np.isnan(d["CT"][0]) and np.isnan(d["J"][0])
 
 
-@pytest.mark.parametrize(("diameter", "density"), [(0.0, 1.2), (math.nan, 1.2), (0.2, 0.0), (0.2, [1.2, -1.0])])
+@pytest.mark.parametrize(
+    ("diameter", "density"), [(0.0, 1.2), (math.nan, 1.2), (254.0, 1.2), (0.2, 0.0), (0.2, [1.2, -1.0])]
+)
 def test_derive_refuses_nonsense(diameter: float, density: object) -> None:
     with pytest.raises(InputError):
         stand().derive(diameter, density)  # type: ignore[arg-type]

@@ -16,7 +16,7 @@ from diagnosing import CASES, case, points, recording
 import bemt
 from bemt.app.cli import main, parsed
 from bemt.base.errors import InputError
-from bemt.judge.diagnose import assemble, chain, document, record, suggest
+from bemt.judge.diagnose import assemble, chain, document, other_rotor, record, suggest
 from bemt.judge.diagnose.load import load
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case import load_case
@@ -458,6 +458,23 @@ def test_both_loads_off_by_one_factor_are_a_matter_of_the_speed() -> None:
     (found,) = assemble.build(records, [case()]).findings
     assert found.startswith("2.csv: error: rpm_electrical (rpm): readings over what the case gives are 0.02")
     assert "taken for mechanical: divide by 7 pole pairs" in found
+
+
+@pytest.mark.parametrize("pairs", [6, 7, 11])
+def test_pole_pairs_are_told_at_the_true_speed(pairs: int) -> None:
+    """Seven times too fast the model's tips are near the speed of sound: its loads are not 49 times as large."""
+    series = recording(case("prop_10x5"), points("static") | {"rpm": np.linspace(2500.0, 7000.0, 17)})
+    fast = replace(series, values={**series.values, "rpm": pairs * series["rpm"]})
+    built = assemble.build([record.from_series(fast, case("prop_10x5"))], [case("prop_10x5")])
+    assert other_rotor.suspects(built)[0].words.endswith(f"divide by {pairs} pole pairs")
+
+
+def test_the_formula_is_put_beside_a_recording_with_a_throttle(tmp_path: Path) -> None:
+    """K1/K2 knows no torque, so that nothing is said of the drive."""
+    rows = "".join(f"{n},{1.3e-7 * n * n},{n / 100.0}\n" for n in range(3000, 9001, 1000))
+    (tmp_path / "a.csv").write_text(f"RPM,Thrust (N),Throttle (%)\n{rows}")
+    found = bemt.diagnose(tmp_path / "a.csv", str(CASES / "prop_10x5"), baseline="k1k2")
+    assert set(found.to_dict()["fit"]) == {"thrust_N"}
 
 
 def test_of_two_recordings_the_one_nearer_the_case_is_taken_to_be_right() -> None:

@@ -161,6 +161,17 @@ def test_a_recording_is_drawn_beside_a_curve_in_its_colours() -> None:
     assert "<td>" in curve._repr_html_() and "prop_10x5" in bemt.propeller("10x5")._repr_html_()
 
 
+def test_a_drawing_frames_every_line_and_point() -> None:
+    """Two speeds, and a recording far off the curve."""
+    pytest.importorskip("matplotlib").use("Agg")
+    rotor = bemt.propeller("10x5")
+    axes = rotor.curve(rpm=[4000, 6500], J=[0.0, 0.2, 0.4]).plot("J", ["thrust_N"])
+    far = bemt.Dataset("bench", "stand", {"J": [0.1, 0.3], "thrust_N": [20.0, 30.0], "rpm": [6500.0, 6500.0]})
+    far.plot("J", ["thrust_N"], axes)
+    low, high = axes.get_ylim()
+    assert all(low <= y <= high for line in axes.lines for y in line.get_ydata())
+
+
 def test_a_log_is_read_and_diagnosed_from_a_frame(tmp_path: Path) -> None:
     pd = pytest.importorskip("pandas")
     prop = bemt.propeller("10x5")

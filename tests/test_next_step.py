@@ -103,12 +103,18 @@ def test_a_level_beside_a_reference_asks_for_the_weather_of_both_days() -> None:
 
 
 @pytest.mark.parametrize(
-    ("factor", "found", "words"),
-    [(-1.0, "the other sign", "reverse the sign of thrust_N"), (1.0 / 9.80665, "kgf", "check the unit")],
+    ("loads", "factor", "found", "words"),
+    [
+        (("thrust_N",), -1.0, "the other sign", "reverse the sign of thrust_N"),
+        (("thrust_N", "torque_Nm"), -1.0, "the other sign", "reverse the sign of both loads"),
+        (("thrust_N",), 1.0 / 9.80665, "kgf", "check the unit"),
+    ],
 )
-def test_a_slip_of_unit_or_sign_is_put_right_without_a_run(factor: float, found: str, words: str) -> None:
+def test_a_slip_of_unit_or_sign_is_put_right_without_a_run(
+    loads: tuple[str, ...], factor: float, found: str, words: str
+) -> None:
     series = recording(case(), points("static"))
-    said = told(of(replace(series, values={**series.values, "thrust_N": factor * series["thrust_N"]})))
+    said = told(of(replace(series, values={**series.values, **{k: factor * series[k] for k in loads}})))
     assert (said.decision.verdict, said.decision.effects) == ("sensor", ("unit_slip",))
     assert said.parameters["unit_slip"]["unit"].value == found
     assert (said.next.kind, said.next.points) == ("look", ()) and words in step(said)[0]

@@ -143,6 +143,11 @@ def test_header_faults(tmp_path: Path, head: str, words: str) -> None:
     assert any(words in fault for fault in faults(save(tmp_path, head=head)))
 
 
+def test_a_remark_is_no_must(tmp_path: Path) -> None:
+    (one,) = references.read(save(tmp_path, "thrust,27,N,unknown,vendor,a,,,", head=HEAD.replace("remark,", "")))
+    assert one.remark == "" and one.value == 27.0
+
+
 def test_empty_and_missing_files(tmp_path: Path) -> None:
     assert "no rows" in faults(save(tmp_path))[0]
     assert "an empty file" in faults(save(tmp_path, head=""))[0]

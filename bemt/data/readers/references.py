@@ -8,7 +8,8 @@ A comma-separated table with a header line; lines that begin with ``#`` are comm
 * ``unit`` must be given; ``-`` for dimensionless quantities. Mass units for a force (``kg``, ``g``) are refused.
 * ``uncertainty`` is the standard uncertainty (one sigma) in the unit of the value, or the word ``unknown``.
 * ``kind`` is one of :data:`KINDS`.
-* ``rpm``, ``airspeed_m_s``, ``density_kg_m3`` are optional columns; an empty cell means "as the case says".
+* ``remark``, ``rpm``, ``airspeed_m_s``, ``density_kg_m3`` are optional columns; an empty condition means "as the case
+  says".
 
 Nothing suspicious is converted: out-of-range values, an uncertainty larger than its value, and two rows of the same
 quantity and condition that differ by just the factor between kgf and N are refused with a hint.
@@ -36,7 +37,7 @@ from bemt.physics.dataset import Dataset
 
 KIND = "references"
 KINDS = ("cfd", "bench", "vendor", "k1k2_printed", "k1k2", "bemt", "flight", "other")
-COLUMNS = ("quantity", "value", "unit", "uncertainty", "kind", "source", "remark")
+COLUMNS = ("quantity", "value", "unit", "uncertainty", "kind", "source")
 
 QUANTITIES: dict[str, tuple[str, str, float, float]] = {
     "thrust": ("force", "thrust_N", 1e-3, 1e5), "duct_thrust": ("force", "duct_thrust_N", 1e-3, 1e5),
@@ -147,9 +148,7 @@ class _Row:
 def _reference(row: _Row) -> Reference | None:
     """Read one row; None with faults appended when it cannot be used."""
     before = len(row.source.faults)
-    quantity, kind, source, remark, text, unit, uncertainty = (
-        row.cells[column] for column in ("quantity", "kind", "source", "remark", "value", "unit", "uncertainty")
-    )
+    quantity, text, unit, uncertainty, kind, source = (row.cells[column] for column in COLUMNS)
     value = row.number("value", "a finite number")
     factor = math.nan
     if quantity not in QUANTITIES:
@@ -183,7 +182,7 @@ def _reference(row: _Row) -> Reference | None:
     if len(row.source.faults) > before:
         return None
     return Reference(
-        quantity, value * factor, u * factor, QUANTITIES[quantity][1], kind, source, remark,
+        quantity, value * factor, u * factor, QUANTITIES[quantity][1], kind, source, row.cells.get("remark", ""),
         f"{text} {unit}".removesuffix(" -"), where=f"{row.source.name}:{row.line}",
         sha256=row.source.sha256,
         **conditions,  # type: ignore[arg-type]
@@ -209,7 +208,7 @@ def _compare(source: SourceText, references: list[Reference]) -> None:
 def _header(source: SourceText, line: int, cells: list[str]) -> list[str]:
     """Names of the columns, all of them there and known."""
     header = [cell.strip() for cell in cells]
-    known = (*COLUMNS, *CONDITIONS)
+    known = (*COLUMNS, "remark", *CONDITIONS)
     hint = "Separate columns by commas" if ";" in "".join(cells) or "\t" in "".join(cells) else ""
     for name in COLUMNS:
         if name not in header:

@@ -58,7 +58,8 @@ def diagnose(
     each = list(cases) * len(records) if len(cases) == 1 else list(cases)
     told = [(r.only(channels) if channels else r, c) for r, c in zip(records, each, strict=True)]
     loads = [(r.only(CHANNELS[:2]), c) for r, c in told if set(r.measured) - {speed}]
-    turns = [(r.only((speed,)), c) for r, c in told if speed in r.measured]
+    # the formula knows no torque, which is what loads a drive
+    turns = [(r.only((speed,)), c) for r, c in told if speed in r.measured and baseline == "bemt"]
     gone = {*given.ruled_out, *(() if only is None else effects.catalogue().keys() - set(only))}
 
     def judged(pair: RunChange) -> Judgement:

@@ -27,6 +27,7 @@ from bemt.judge.explanation import DOUBT, Explanation
 from bemt.physics.coefficients import CP, CT, FM
 from bemt.physics.effects.base import Effect, RotorBuild
 from bemt.physics.effects.propeller import AnotherPropeller
+from bemt.physics.effects.rpm_scale import RpmScale
 from bemt.rotors.as_measured import FACTOR
 
 if TYPE_CHECKING:
@@ -282,13 +283,12 @@ def _slips(problem: Problem, found: dict[str, float]) -> Iterator[_Slip]:
     rarity = 0.5 if hint else 0.5 + (k / _SIZES) ** 2
     words = f"diameter {size:.3g} m ({size / INCH:.3g} in){hint}"
     yield "diameter", words, {c: p * k for c, p in powers.items()}, rarity
-    for miscount in unit_errors.speed_ratios(rarest=1.0):
-        if 1 in (miscount.true, miscount.set):
-            off = -2.0 * math.log(miscount.ratio)
-            yield (
-                "poles" if miscount.set == 1 else "divided twice", miscount.words, dict.fromkeys(found, off),
-                0.5 + miscount.rarity,
-            )  # fmt: skip
+    # near ones are solved: at a false speed the tips are at another Mach and Reynolds number
+    for m in unit_errors.speed_ratios(rarest=1.0):
+        near = all(abs(v + 2.0 * math.log(m.ratio)) < math.log(FACTOR) for v in found.values())
+        if near and 1 in (m.true, m.set):
+            kind, true = "poles" if m.set == 1 else "divided twice", RpmScale(factor=m.ratio, eps=0.0)
+            yield from _shapes(problem, found, [(kind, m.words, true, 0.5 + m.rarity)])
     for error in unit_errors.errors("rotation"):
         yield "speed", f"rpm: {error.words}", dict.fromkeys(found, -2.0 * math.log(error.factor)), 1.0 + error.rarity
     for channel, kind in ((T, "force"), (Q, "torque")):

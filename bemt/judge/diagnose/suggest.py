@@ -29,6 +29,7 @@ from bemt.judge.loss import minutes
 from bemt.physics import effects
 from bemt.physics.air import R_DRY
 from bemt.physics.bem import model as bem
+from bemt.physics.effects.unit_slip import LOADS
 from bemt.rotors.model import air_of_points
 
 if TYPE_CHECKING:
@@ -446,7 +447,8 @@ def correction(names: Sequence[str], settings: Mapping[str, Mapping[str, Any]], 
             continue
         text, found = _check(name, record), settings.get(name, {})
         if float(found.get("factor", 1.0)) < 0.0 and "channel" in found:
-            text = f"reverse the sign of {found['channel']} (sign = -1 in a recording.toml), or turn the sensor round"
+            what = "both loads" if found["channel"] == LOADS else found["channel"]
+            text = f"reverse the sign of {what} (sign = -1 in a recording.toml), or turn the sensor round"
         return Suggestion(text, (), (), 0.0, 0.0, "look", _restated(found, record))
     return None
 
@@ -458,6 +460,8 @@ def _restated(found: Mapping[str, Any], record: Record) -> tuple[str, ...]:
     """
     channel = str(found.get("channel", ""))
     quantity = next((q for q, d in QUANTITIES.items() if channel in (q, f"{q}_{suffixes(d)[0]}")), "")
+    if channel == LOADS:  # one sign without a name turns all
+        return "sign", "-1"
     if not quantity or "unit" not in found:
         return ()
     if found["factor"] < 0.0:

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 __all__ = ["Dataset"]
 
 _KIND = re.compile(r"[a-z][a-z0-9_]*")
+_LARGEST_M = 10.0  # diameter of a propeller; a larger number is in millimetres
 
 
 def _still(array: NDArray[Any]) -> bool:
@@ -348,7 +349,7 @@ class Dataset:
         Raises
         ------
         InputError
-            If the diameter or a density is not positive.
+            If the diameter or a density is not positive, or the diameter above 10 m.
 
         Notes
         -----
@@ -358,8 +359,9 @@ class Dataset:
         """
         rho = self.values.get("density_kg_m3") if density_kg_m3 is None else np.asarray(density_kg_m3, dtype=float)
         faults = []
-        if not (math.isfinite(diameter_m) and diameter_m > 0):
-            faults.append(Fault(self.name, "diameter_m", f"{diameter_m:g}", "a positive number", ""))
+        if not 0.0 < diameter_m <= _LARGEST_M:
+            hint = "Is that in mm? Divide by 1000" if diameter_m > _LARGEST_M else ""
+            faults.append(Fault(self.name, "diameter_m", f"{diameter_m:g}", f"a length up to {_LARGEST_M:g} m", hint))
         if rho is not None and np.any(rho <= 0):
             faults.append(Fault(self.name, "density_kg_m3", "a density that is not positive", "positive numbers", ""))
         refuse(faults)

@@ -90,7 +90,8 @@ def plot(d: Dataset, x: str | None = None, y: Sequence[str] = (), ax: Any = None
         ax = plt.subplots(layout="constrained")[1]
         ax.set_prop_cycle(color=CYCLE)
     drawn = [line.get_gid() for line in ax.lines]
-    colours = {line.get_gid(): line.get_color() for line in ax.lines if drawn.count(line.get_gid()) == 1}
+    colours = {line.get_gid(): line.get_color() for line in ax.lines  # of points beside a line, or a line beside points
+               if drawn.count(line.get_gid()) == 1 and (line.get_marker() == "o") != points}  # fmt: skip
     speeds = _speeds(d.rpm) if "rpm" in d and x != "rpm" else {np.nan: np.arange(len(d))}
     for channel in wanted:
         for speed, at_speed in speeds.items():
@@ -104,17 +105,26 @@ def plot(d: Dataset, x: str | None = None, y: Sequence[str] = (), ax: Any = None
             if np.any(u > 0.0) and points:
                 ax.errorbar(at, value, np.nan_to_num(u), fmt="none", ecolor=line.get_color(), lw=1)
             elif np.any(u > 0.0):
-                # a band that is wider than all values, as an efficiency's near no thrust, leaves the frame
-                low, high = ax.get_ylim()
                 ax.fill_between(at, value - u, _top(d, channel, rows), alpha=0.2, color=line.get_color(), lw=0)
-                (below, above), most = ax.get_ylim(), 0.5 * (high - low)
-                ax.set_ylim(max(below, low - most), min(above, high + most))
+    _framed(ax)
     ax.set_xlabel(x)
     ax.set_ylabel(", ".join(wanted))
     if not beside:
         ax.set_title(d.name, fontsize=10)
     ax.legend(fontsize=8, frameon=False)
     return ax
+
+
+def _framed(ax: Any) -> None:
+    """Frame all lines; a band that is wider than all values, as an efficiency's near no thrust, leaves the frame."""
+    ax.relim()
+    low, high = ax.dataLim.intervaly
+    most = 0.5 * (high - low)
+    for band in ax.collections:
+        for path in band.get_paths():
+            at = path.vertices[np.isfinite(path.vertices).all(axis=1)]
+            ax.update_datalim(np.column_stack([at[:, 0], np.clip(at[:, 1], low - most, high + most)]))
+    ax.autoscale_view()
 
 
 def _speeds(rpm: Array) -> dict[float, NDArray[np.intp]]:

@@ -12,7 +12,9 @@ from bemt.physics.effects.base import Effect, Flow, Parameter, Reading
 _SIGNED = ("thrust_N", "torque_Nm", "airspeed_m_s")
 _KINDS = {"thrust_N": "force", "torque_Nm": "torque", "rpm": "rotation", "airspeed_m_s": "airspeed",
           "density_kg_m3": "density"}  # fmt: skip
-CHANNELS = tuple(_KINDS)
+LOADS = "loads"
+"""Thrust and torque, along an axis that points the other way."""
+CHANNELS = (*_KINDS, LOADS)
 _KGF = unit_errors.named("kgf", "N")
 _Setting = dict[str, str | float]
 
@@ -26,13 +28,15 @@ def _settings() -> dict[tuple[str, float], tuple[_Setting, float]]:
             factor = next((f for c, f in out if c == channel and math.isclose(f, e.factor, rel_tol=1e-9)), e.factor)
             first, weight = out.get((channel, factor), ({"channel": channel, "factor": factor, "unit": e.short}, 0.0))
             out[channel, factor] = first, max(weight, e.weight)
-    signs: list[_Setting] = [{"channel": c, "factor": -1.0, "unit": "the other sign"} for c in _SIGNED]
+    signs: list[_Setting] = [{"channel": c, "factor": -1.0, "unit": "the other sign"} for c in (*_SIGNED, LOADS)]
     return out | {(str(s["channel"]), -1.0): (s, 1.0) for s in signs}
 
 
 @dataclass(frozen=True)
 class UnitSlip(Effect):
     """One channel is recorded as ``factor`` times its true value, the ratio of two units, or with the other sign.
+
+    Both loads have the other sign where the axis of the balance points the other way (``channel`` "loads").
 
     Notes
     -----
@@ -69,8 +73,10 @@ class UnitSlip(Effect):
 
     def reading(self, reading: Reading, flow: Flow) -> None:
         """Show the slip in what was measured."""
-        if self.channel in ("thrust_N", "torque_Nm"):
-            reading.values[self.channel] = reading.values[self.channel] * self.factor
+        loads = ("thrust_N", "torque_Nm")
+        for load in loads if self.channel == LOADS else {self.channel}.intersection(loads):
+            if load in reading.values:
+                reading.values[load] = reading.values[load] * self.factor
 
     def variants(self) -> tuple[dict[str, str | float], ...]:
         """Every pair of units of every channel, both ways, and the sign of what a stand may count the other way."""

@@ -503,7 +503,7 @@ def find_cases(paths: Iterable[str | Path]) -> list[Path]:
             from geometry.designation import parse_designation
 
             with suppress(GeometryError):
-                parse_designation(item.as_posix())
+                parse_designation(item.name if len(item.parts) == 1 else "")
                 hint = f"A label? `bemt new {shlex.quote(item.as_posix())}` writes its case"
             fault = Fault(item.as_posix(), "", "no such file or folder", "a case file or a folder of cases", hint)
             faults.append(fault)
