@@ -119,7 +119,8 @@ class Part:
             model.prepared, effects, self.flow, self._same_flow if model is self.model else None
         )
         nan = np.where(ok, 1.0, np.nan)
-        return loads.T * nan, loads.Q * nan, met
+        taught_T, taught_Q = model.taught(met.rpm, met.V, met.rho, met.mu)
+        return (loads.T + taught_T) * nan, (loads.Q + taught_Q) * nan, met
 
     @cached_property
     def _whole(self) -> bem.Model:
@@ -369,7 +370,7 @@ def _of_points(parts: Sequence[Part], rpm: Array, J: Array, Re: Array) -> Array:
     f, top, T = (np.nan_to_num(v) for v in (here.f, here.top, here.T))
     here = replace(here, f=f, top=np.where(top == 0.0, _NOTHING, top), T=T)
     # that the population is not centred at the case is one more thing that is not known of this rotor
-    usual = p.bias(here).reshape(-1)
+    usual = p.bias(here).reshape(-1) if model.learned is None else np.zeros(2 * rpm.size)  # a run has told it
     C = p.rest(here)
     if not any(q.record.reference for q in parts):  # it shows the blade itself
         slopes = T.transpose(0, 2, 1).reshape(2 * rpm.size, -1)

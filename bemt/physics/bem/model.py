@@ -176,6 +176,14 @@ class Model:
             level=level, re_range=self.re_range,
         ))  # fmt: skip
 
+    def taught(self, rpm: Array, V: Array, rho: ArrayLike, mu: ArrayLike) -> tuple[Array, Array]:
+        """Thrust [N] and torque [N m] that a run of this rotor taught beyond the solver's, (P,); zero without a run."""
+        if self.learned is None:
+            return np.zeros_like(rpm), np.zeros_like(rpm)
+        n, D = rpm / 60.0, self.diameter_m
+        change = self.learned(V / (n * D), np.asarray(co.Re75(self.chord75_m, n, D, 0.0, rho, mu)))
+        return np.asarray(co.thrust(change[0], rho, n, D)), np.asarray(co.power(change[1], rho, n, D)) / (2.0 * np.pi * n)
+
     def solve(
         self, rpm: ArrayLike, V: ArrayLike = 0.0, air: Air | None = None, threads: int = 1, side: ArrayLike = 0.0,
         near: Near | None = None,
@@ -201,9 +209,8 @@ class Model:
             more = ((), ("unconverged with the effects that act on points",))
             flags = tuple((*f, *more[int(not good)]) for f, good in zip(s.flags, ok, strict=True))
         if self.learned is not None:
-            change = self.learned(s.J, np.asarray(co.Re75(self.chord75_m, n, D, 0.0, rho, mu)))
-            T, drawn = T + np.asarray(co.thrust(change[0], rho, n, D)), T
-            Q = Q + np.asarray(co.power(change[1], rho, n, D)) / (2.0 * np.pi * n)
+            more_T, more_Q = self.taught(s.rpm, s.V, rho, mu)
+            T, drawn, Q = T + more_T, T, Q + more_Q
             # rotor, duct and stator share it, and the jet by momentum
             with np.errstate(divide="ignore", invalid="ignore"):
                 grown = T / drawn
