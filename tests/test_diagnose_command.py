@@ -603,6 +603,6 @@ def test_power_that_may_be_electrical_is_asked_about_before_a_torque_cell(tmp_pa
     rows = zip(found.rpm, found.thrust_N, found.torque_Nm * found.rpm * np.pi / 30.0 / 0.75, strict=True)
     body = "".join(f"{n:.0f},{T:.4f},{P:.2f}\n" for n, T, P in rows)
     (tmp_path / "a.csv").write_text(f"rpm,Thrust (N),Power (W)\n{body}", "utf-8")
-    assert "if a wattmeter read it, name the column electrical_power_W" in " ".join(
-        bemt.diagnose(str(tmp_path / "a.csv"), p).text.split()
-    )
+    answer = bemt.diagnose(str(tmp_path / "a.csv"), p)
+    assert "if a wattmeter read it, name the column electrical_power_W" in " ".join(answer.text.split())
+    assert not any("torque" in effect for effect in answer.effects)

@@ -182,7 +182,8 @@ class Model:
             return np.zeros_like(rpm), np.zeros_like(rpm)
         n, D = rpm / 60.0, self.diameter_m
         change = self.learned(V / (n * D), np.asarray(co.Re75(self.chord75_m, n, D, 0.0, rho, mu)))
-        return np.asarray(co.thrust(change[0], rho, n, D)), np.asarray(co.power(change[1], rho, n, D)) / (2.0 * np.pi * n)
+        thrust, power = co.thrust(change[0], rho, n, D), co.power(change[1], rho, n, D)
+        return np.asarray(thrust), np.asarray(power) / (2.0 * np.pi * n)
 
     def solve(
         self, rpm: ArrayLike, V: ArrayLike = 0.0, air: Air | None = None, threads: int = 1, side: ArrayLike = 0.0,
