@@ -337,7 +337,8 @@ def _before_after(answer: Diagnosis) -> Figure:
     height = 0.9 + 2.2 * len(channels)
     figure, axes = blank(height, len(channels), len(shown), sharex="col", sharey="row")
     unit, factor = _coefficients(answer), answer.found.states[0].hyper.scale
-    what, everywhere = " + ".join(answer.best.ids) or "calibration only", np.ones_like(problem.free)
+    what = " and ".join([" + ".join(answer.best.ids), "calibration"]).removeprefix(" and ")
+    everywhere = np.ones_like(problem.free)
     fitted = "improved" if answer.decision.verdict in _SAID else "best fit, not confirmed"
     models = (
         ("baseline", problem.f0, RED, "--", everywhere),
