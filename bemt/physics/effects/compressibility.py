@@ -27,7 +27,7 @@ class Compressibility(Effect):
     whose mean pressures are -2 t/c (thin ellipse) -+ cl/2.
 
     Either holds up to the lift-divergence Mach number, set 0.04 above Korn's drag divergence M_dd = kappa - t/c - cl/10
-    (Mason 1990, AIAA 90-3029; not checked). Above it, lift falls within 0.12 in M to ``shock_stall`` times the
+    (Mason 1990, AIAA 90-3262; not checked). Above it, lift falls within 0.12 in M to ``shock_stall`` times the
     incompressible one and recovers between M = 1 and 1.1 to at most 1 or Ackeret's 4 / (2 pi sqrt(M^2 - 1)). The fall
     is a declared rule with the shape of published NACA 0012 tables, not a fit to rotor data. Acts on the attached part;
     separated flow (beyond 40 deg) is not changed.

@@ -18,9 +18,9 @@ class DragDivergence(Effect):
 
     Notes
     -----
-    Korn's drag-divergence Mach number is M_dd = kappa - t/c - cl/10 (Mason 1990, AIAA 90-3029, not checked). ``form =
+    Korn's drag-divergence Mach number is M_dd = kappa - t/c - cl/10 (Mason 1990, AIAA 90-3262, not checked). ``form =
     "lock"``: fourth-power law cd_w = 20 (M - M_cr)^4 with M_cr = M_dd - (0.1/80)^(1/3); Mason (1990), as quoted in
-    Malone and Mason (1995), J. Aircraft 32:1045 (not checked against the papers). ``form = "cubic"``: cd_w = 10 (M -
+    Malone and Mason (1995), J. Aircraft 32:431 (not checked against the papers). ``form = "cubic"``: cd_w = 10 (M -
     M_cr)^3 with M_cr = M_dd - (0.002/10)^(1/3), which gives 0.002 at M_dd, as in XROTOR (Drela and Youngren 2003; read
     from memory of its source).
 
