@@ -22,9 +22,9 @@ class TipGap(Effect):
     A tip gap has two parts (Wisler 1985; Cumpsty 1989, ch. 8; not checked against the books). The wall mirrors the tip
     vortex, so Prandtl's deficit 1 - F is scaled by 1 - exp(-gap / (scale R)): zero if sealed, full if the wall is far
     away (declared rule between two known limits). Leakage costs pressure rise in proportion to gap over span, ``loss``
-    points per point: 1 to 2 in Wisler (1985), J. Eng. Gas Turbines Power 107:354, and Cumpsty (1989), Compressor Aerodynamics; a
-    case states it as ``duct.gap_loss``. Off means a sealed tip. In a recording with ``tip_gap_m`` the gap of the case
-    corresponds to the largest recorded one, the others are in proportion; see :meth:`share`.
+    points per point: 1 to 2 in Wisler (1985), J. Eng. Gas Turbines Power 107:354, and Cumpsty (1989), Compressor
+    Aerodynamics; a case states it as ``duct.gap_loss``. Off means a sealed tip. In a recording with ``tip_gap_m`` the
+    gap of the case corresponds to the largest recorded one, the others are in proportion; see :meth:`share`.
     """
 
     loss: float = 1.5
