@@ -23,6 +23,7 @@ from bemt.judge.diagnose.suggest import LEVEL
 from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation, Size
 from bemt.physics import effects
 from bemt.physics.effects.propeller import AnotherPropeller
+from bemt.rotors.case.fresh import OPEN_ENDINGS
 
 if TYPE_CHECKING:
     from bemt.judge.diagnose.answer import Diagnosis, Location
@@ -50,6 +51,8 @@ _A_GROUP = 5
 _GUESS = 0.3
 # Level that is said even where no cause shows.
 _WORTH_SAYING = 0.05
+# Level from which on it is asked whether the rotor is that of the case.
+_WORTH_ASKING = 0.15
 # Lines of an answer, and sentences that are only in its details.
 _LINES, _DETAILS = 12, ("Model: ", "Signature: ", "Predicting ")
 # Ratios between these are said in percent.
@@ -252,13 +255,15 @@ def explanation(d: Diagnosis) -> list[str]:
     speaks = d.found.probability.get(DOUBT, 0.0) > d.found.prior.get(DOUBT, 1.0)
     likelier = open_ and level and speaks and not doubted
     if likelier or doubted or decision.effects[:1] == (AnotherPropeller.id,):
-        lead = f"The loads are off the case ({off}): are diameter, pitch and blades its own?" if likelier else ""
+        lead = f"The loads are off the case ({off}): are {_stated(d)} its own?" if likelier else ""
         near = other_rotor.nearest_rotors(d.problem)
         lines += [told] if (told := " ".join(filter(None, (lead, near and f"Nearest rotors: {near}.")))) else []
     if decision.verdict == "none":
         lines.append(f"Why: {decision.why}.")
         if max((abs(v) for v in level.values()), default=0.0) > _WORTH_SAYING:
             lines.append(f"The level is off ({off}), within what gain, blade angle and solver allow; no cause shows.")
+            if alone and max(map(abs, level.values())) > _WORTH_ASKING:
+                lines[-1] += f" Are {_stated(d)} right?"
         return [*lines, _gain(d), *_next(d), *_not_tried(d)]
     known = decision.verdict not in ("unknown", "insufficient") or doubted
     lines += [_where(d.where, _words(d))] if known else _unexplained(d)
@@ -285,6 +290,13 @@ def explanation(d: Diagnosis) -> list[str]:
         lines.append(f"Thrust and torque at the measured speed, judged separately: {headline(d.loads)}")
     lines += [*_next(d), *_not_tried(d)]
     return [line for line in lines if line]
+
+
+def _stated(d: Diagnosis) -> str:
+    """What a case states of its rotor: of a label the ending, too, which tells the kind of blade."""
+    known = [p.as_built for p in d.problem.parts if p.as_built is not None]
+    label = bool(known) and all(k.prior.known_from == "label" for k in known)
+    return f"diameter, pitch, blades and ending ({', '.join(OPEN_ENDINGS)})" if label else "diameter, pitch and blades"
 
 
 def _next(d: Diagnosis) -> list[str]:
