@@ -168,13 +168,13 @@ def _tried(stand: hand.Simulated, what: str) -> tuple[float, str]:
         guards = psutil.Process(child.pid).children() if child.poll() is None else []
         since = time.monotonic()
         child.send_signal(signal.SIGKILL if what == "killed" else signal.SIGINT)
-        child.wait(timeout=20.0)
+        child.wait(timeout=120.0)
         seconds = _stopped_after(stand, since)
-        assert not psutil.wait_procs(guards, timeout=20.0)[1], "its guard lets go of the wire"
+        assert not psutil.wait_procs(guards, timeout=120.0)[1], "its guard lets go of the wire"
         return seconds, ""
     wire = _Cut(stand.address) if what == "cut" and stand.wire == "flightstand" else None
     try:
-        with Stand(stand.wire, wire.address if wire else stand.address, "", LIMITS, 1.0) as head:
+        with Stand(stand.wire, wire.address if wire else stand.address, "", LIMITS, 0.3) as head:
             head.pulse(1400.0)
             since = time.monotonic()
             if what == "guard killed":
