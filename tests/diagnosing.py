@@ -73,6 +73,12 @@ def diagnose(series: Dataset, baseline: Case) -> chain.Diagnosis:
     return chain.diagnose([record.from_series(series, baseline)], [baseline])
 
 
+@cache
+def compressibility_missed() -> chain.Diagnosis:
+    """Answer on a grid of conditions beside a case without compressibility, of which several promises are asked."""
+    return diagnose(recording(case(), points("grid")), left_out("compressibility", case()))
+
+
 def left_out(name: str, base: Case) -> Case:
     return base.replaced({"model.effects_off": [name]})
 

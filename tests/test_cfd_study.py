@@ -259,9 +259,9 @@ def test_numbers_that_no_grid_gives_are_no_study() -> None:
 
 def test_a_heading_that_is_repeated_ten_thousand_times_costs_no_more_than_another() -> None:
     """Names made unique one by one would take minutes."""
-    start = time.perf_counter()
+    start = time.process_time()
     made = unique(["x"] * 30_000 + ["x#7", "y"])
-    assert time.perf_counter() - start < 5.0
+    assert time.process_time() - start < 5.0
     assert len(set(made)) == len(made) and made[:3] == ["x", "x#2", "x#3"] and made[-2:] == ["x#7", "y"]
     assert made[6] == "x#8"  # a heading of the file keeps its name
 

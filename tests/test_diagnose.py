@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosing import case, diagnose, left_out, points, recording
+from diagnosing import case, compressibility_missed, diagnose, left_out, points, recording
 
 from bemt.judge.diagnose import assemble, chain, document, figures, form, noise, plan, posterior, record, signatures
 from bemt.judge.explanation import UNKNOWN, Explanation
@@ -30,7 +30,7 @@ def test_correlated_noise_alone_names_nothing() -> None:
 
 
 def test_compressibility_left_out_is_named_located_and_mended() -> None:
-    answer = diagnose(recording(case(), GRID), left_out("compressibility", case()))
+    answer = compressibility_missed()
     assert (answer.decision.verdict, answer.decision.effects) == ("named", ("compressibility",)), document.text(answer)
     assert answer.where is not None and answer.where.variable == "M_tip"
     assert answer.where.low > 0.3, "Mach number acts at the fast end"
@@ -189,7 +189,7 @@ def test_a_shuffled_covariate_takes_the_claim_away() -> None:
 
 
 def test_the_document_keeps_its_schema() -> None:
-    answer = diagnose(recording(case(), GRID), left_out("compressibility", case()))
+    answer = compressibility_missed()
     doc = json.loads(json.dumps(document.document(answer)))
     assert doc["schema"] == "bemt.diagnosis/1"
     assert {

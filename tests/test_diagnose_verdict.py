@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from diagnosing import case, diagnose, left_out, points, recording
+from diagnosing import case, compressibility_missed, diagnose, points, recording
 from interval_scales import Off, calibrate
 
 from bemt.judge import loss
@@ -25,7 +25,7 @@ from bemt.rotors.propeller import rotor_of
 
 @pytest.fixture(scope="module")
 def answer() -> chain.Diagnosis:
-    return diagnose(recording(case(), points("grid")), left_out("compressibility", case()))
+    return compressibility_missed()
 
 
 def explained(words: str) -> Explanation:

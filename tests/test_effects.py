@@ -421,15 +421,10 @@ def test_several_effects_of_one_file(extra: Path) -> None:
     assert vars(effects.from_text("this(factor=1.5)")) == {"factor": 1.5, "form": "round"}
 
 
-def test_an_effect_without_id_is_refused(extra: Path) -> None:
-    (extra / "nameless.py").write_text(NEW.format(cls="Nameless", id=""))
-    with pytest.raises(ValueError, match="Nameless: id '' is empty"):
-        effects.catalogue()
-
-
-def test_two_effects_of_one_id_are_refused(extra: Path) -> None:
-    (extra / "made_up_twice.py").write_text(NEW.format(cls="Twice", id="swirl"))
-    with pytest.raises(ValueError, match="id 'swirl' is empty or taken"):
+@pytest.mark.parametrize("name", ["", "swirl"])
+def test_an_effect_without_an_id_of_its_own_is_refused(extra: Path, name: str) -> None:
+    (extra / "made_up.py").write_text(NEW.format(cls="MadeUp", id=name))
+    with pytest.raises(ValueError, match=f"MadeUp: id '{name}' is empty or taken"):
         effects.catalogue()
 
 

@@ -256,7 +256,7 @@ def test_thrust_and_torque_have_the_right_factor_and_sign(tmp_path: Path, B: int
     thrust = np.concatenate([np.zeros(30), np.linspace(1.9, 2.1, 10)])
     write_forces(tmp_path / "case", thrust, np.full(40, -0.03 * rotation))  # the air turns the rotor back
     env = fake_programs(tmp_path / "bin")
-    run = subprocess.run(["bash", str(script), "report"], capture_output=True, text=True, env=env, timeout=60)
+    run = subprocess.run(["bash", str(script), "report"], capture_output=True, text=True, env=env, timeout=600)
     assert run.returncode == 0, run.stdout + run.stderr
     parts = {"half": 2, "blade": B, "full": 1}[sector]
     found = re.search(r"thrust (\S+) N \(drift (\S+) %\), torque (\S+) N m \(drift (\S+) %\)", run.stdout)
@@ -275,7 +275,7 @@ def test_a_diverged_run_ends_in_an_error(tmp_path: Path, rows: int, size: float,
     script.write_text(case_files(settings(iterations=40, average=10))["Allrun"])
     write_forces(tmp_path, np.full(rows, size), np.full(rows, -0.1), word)
     env = fake_programs(tmp_path / "bin")
-    run = subprocess.run(["bash", str(script), "report"], capture_output=True, text=True, env=env, timeout=60)
+    run = subprocess.run(["bash", str(script), "report"], capture_output=True, text=True, env=env, timeout=600)
     assert run.returncode == 3 and "diverged" in run.stdout
 
 
@@ -284,7 +284,7 @@ def test_allrun_says_when_openfoam_is_absent(tmp_path: Path) -> None:
     script.write_text(case_files(settings())["Allrun"])
     bash = shutil.which("bash")
     assert bash is not None
-    run = subprocess.run([bash, str(script)], capture_output=True, text=True, env={"PATH": ""}, timeout=60)
+    run = subprocess.run([bash, str(script)], capture_output=True, text=True, env={"PATH": ""}, timeout=600)
     assert run.returncode == 1 and "OpenFOAM is not installed" in run.stderr
 
 
@@ -310,7 +310,7 @@ def test_allrun_removes_what_a_run_left_and_nothing_else(tmp_path: Path, step: s
     for name in ("decomposePar", "topoSet", "createPatch", "checkMesh", "setFields", "mpirun"):
         (tmp_path / "bin" / name).write_text("#!/bin/sh\nexit 0\n")
         (tmp_path / "bin" / name).chmod(0o755)
-    run = subprocess.run(["bash", str(case / "Allrun"), step], capture_output=True, text=True, env=env, timeout=60)
+    run = subprocess.run(["bash", str(case / "Allrun"), step], capture_output=True, text=True, env=env, timeout=600)
     assert run.returncode == (0 if step == "mesh" else 3) and "rm:" not in run.stderr, run.stdout + run.stderr
     for name in mine:
         assert (case / name).read_text() == "old", name

@@ -33,7 +33,7 @@ OUTLINE = Rotor(helix(0.2032, 0.127, anchors=naca("4412")), 2)
 def drawing() -> None:
     """Skip where nothing can be drawn off-screen at all."""
     code = "import pyvista as pv; p = pv.Plotter(off_screen=True); p.add_mesh(pv.Cube()); p.screenshot(return_img=True)"
-    if subprocess.run([sys.executable, "-c", code], capture_output=True, timeout=120, check=False).returncode:
+    if subprocess.run([sys.executable, "-c", code], capture_output=True, timeout=600, check=False).returncode:
         pytest.skip(picture.NEEDS)
 
 

@@ -28,7 +28,6 @@ class Truth:
 
     def __init__(self, bench: Bench, entry: Entry, lapse: float = 1.0) -> None:
         self.bench, self.entry, self.lapse = bench, entry, lapse
-        self.patience = CUT_OFF_S if lapse == 1.0 else 100.0 * CUT_OFF_S
         self.lock = threading.RLock()
         self.cells: dict[str, float] | None = None  # As they read at the speed ``read_at``
         self.read_at = self.torque = 0.0
@@ -38,6 +37,11 @@ class Truth:
         own = self._hidden(())
         self.scales = full_scales(bench.measure(own.world, own.stand)[0])
         self.set_up("again", [], (), 0)
+
+    @property
+    def patience(self) -> float:
+        """Longest time without a client. [s]"""
+        return CUT_OFF_S if self.lapse == 1.0 else 100.0 * CUT_OFF_S
 
     def _hidden(self, mended: Sequence[str]) -> Hidden:
         e = self.entry

@@ -3,7 +3,7 @@
 KEY is the folder of a sealed proof: what is wrong stays in this process. It answers on the wire of a real stand, so
 that the driver and the guard are those of a real one: ``flightstand`` (gRPC), ``rcbenchmark`` (UDP) or ``serial`` (a
 pseudo-terminal). What a person does at a stand comes as lines of JSON: set up a run, wind and wall of a row, look,
-mend; and, for the tests, what breaks.
+mend; and, for the tests, what breaks and how fast time runs.
 """
 
 from __future__ import annotations
@@ -148,7 +148,9 @@ def _forever(do: Callable[[], None]) -> None:
 _WIRES = {"flightstand": _flightstand, "rcbenchmark": _rcbenchmark, "serial": _serial}
 
 
-def _by_hand(truth: Truth, do: str, name: str = "", names: Sequence[str] = (), what: str = "", **said: Any) -> Any:
+def _by_hand(
+    truth: Truth, do: str, name: str = "", names: Sequence[str] = (), what: str = "", to: float = 1.0, **said: Any
+) -> Any:  # fmt: skip
     """What a person does at the stand."""
     match do:
         case "set up":
@@ -163,6 +165,8 @@ def _by_hand(truth: Truth, do: str, name: str = "", names: Sequence[str] = (), w
             return {"us": truth.us, "since": truth.changed, "now": time.monotonic()}
         case "break":
             truth.broken = what
+        case "lapse":
+            truth.lapse = to
 
 
 def _say(**said: Any) -> None:
