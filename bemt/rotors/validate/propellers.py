@@ -200,7 +200,8 @@ def text(doc: Validation) -> str:
         lines.append(f"  {some} are among the propellers that this population was fitted to: no independent check.")
     lines += [
         "",
-        f"Errors of BEMT in percent of the measured value. Static: {doc.static.points} points of "
+        f"Errors of {'the rotor as built, as expected,' if drawn else 'BEMT'} in percent of the measured value. "
+        f"Static: {doc.static.points} points of "
         f"{doc.static.propellers} propellers; forward: {doc.forward.points} points of "
         f"{doc.forward.propellers}, J up to {doc.J_share:g} J0.",
     ]
