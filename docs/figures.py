@@ -132,7 +132,7 @@ def wilson(hits: int, n: int, z: float = 1.96) -> tuple[float, float]:
 
 
 def real_claims(text: str) -> list[int]:
-    """Right and all claims on real recordings: found or in a class, and wrong, of every kind of this version's table."""
+    """Right and all claims on real recordings, of every kind of this version's table."""
     rows = re.findall(r"^\| ([^|]+) \| \d+ \| ([-\d]+) \| ([-\d]+) \|.*\| (\d+) \|$", text, re.MULTILINE)
     found = [[int(v.replace("-", "0")) for v in row[1:]] for row in rows if "by version" not in row[0]]
     right = sum(a + b for a, b, _ in found)

@@ -33,7 +33,7 @@ def to_pandas(d: Dataset) -> pd.DataFrame:
     columns: dict[str, Any] = dict(d.values)
     columns |= {f"u_{key}": v for key, v in d.u.items() if not np.all(np.isnan(v))}
     columns |= {f"u_{origin}_{key}": v for origin, parts in d.u_by.items() for key, v in parts.items()}
-    if any(d.flags):
+    if any(d.flags) or d.kind in ("bemt", "k1k2"):  # of what is solved it is always asked
         columns["flags"] = ["; ".join(words) for words in d.flags]
     frame = pd.DataFrame(columns, index=pd.Index(d.labels) if d.labels else None)
     about = {"kind": d.kind, "name": d.name, "provenance": dict(d.provenance), "notes": list(d.notes)}
