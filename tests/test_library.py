@@ -161,6 +161,11 @@ def test_a_recording_is_drawn_beside_a_curve_in_its_colours() -> None:
     assert "<td>" in curve._repr_html_() and "prop_10x5" in bemt.propeller("10x5")._repr_html_()
 
 
+def test_what_was_solved_has_its_flags_in_a_table() -> None:
+    """A flag that is only there when a point is flagged is not looked at."""
+    assert list(bemt.propeller("5x2.5").solve(rpm=12000, bands=False).to_pandas()["flags"]) == [""]
+
+
 def test_a_drawing_frames_every_line_and_point() -> None:
     """Two speeds, and a recording far off the curve."""
     pytest.importorskip("matplotlib").use("Agg")

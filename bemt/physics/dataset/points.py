@@ -438,7 +438,8 @@ class Dataset:
         -------
         pandas.DataFrame
             A column per channel, ``u_<channel>`` if its uncertainty is known for some points, ``u_<origin>_<channel>``
-            for its parts, ``flags`` (joined by "; ") of what is solved, else if any; ``attrs`` has kind, name, provenance and notes.
+            for its parts, ``flags`` (joined by "; ") of what is solved, else if any; ``attrs`` has kind, name,
+            provenance and notes.
 
         Examples
         --------
