@@ -615,6 +615,13 @@ def _again(word: str, case: Case, tmp_path: Path, rpm: float, V: float) -> tuple
     return solve_points(back, rpm, V), solve_points(target.compared(job), rpm, V)  # type: ignore[attr-defined]
 
 
+def same_coefficients(got: Any, want: Any, rpm: float, D: float) -> None:
+    """CT and CP to a millionth."""
+    scale = 1.225 * (rpm / 60.0) ** 2 * D**4
+    assert got.thrust_N / scale == pytest.approx(want.thrust_N / scale, abs=1e-6)
+    assert 2 * np.pi * got.torque_Nm / scale / D == pytest.approx(2 * np.pi * want.torque_Nm / scale / D, abs=1e-6)
+
+
 @pytest.mark.parametrize("word", ["xrotor", "qprop"])
 def test_a_file_that_holds_the_sections_comes_back_the_same(word: str, job: Job, tmp_path: Path) -> None:
     """The first file fits the case; what is read from it is a case that the format can hold."""
@@ -624,19 +631,11 @@ def test_a_file_that_holds_the_sections_comes_back_the_same(word: str, job: Job,
     for k, V in enumerate((0.0, 8.0)):
         folder = tmp_path / str(k)
         folder.mkdir()
-        got, want = _again(word, held, folder, 10_000.0, V)
-        scale = 1.225 * (10_000.0 / 60.0) ** 2 * 0.254**4
-        assert got.thrust_N / scale == pytest.approx(want.thrust_N / scale, abs=1e-6)
-        assert 2 * np.pi * got.torque_Nm / scale / 0.254 == pytest.approx(
-            2 * np.pi * want.torque_Nm / scale / 0.254, abs=1e-6
-        )
+        same_coefficients(*_again(word, held, folder, 10_000.0, V), 10_000.0, 0.254)
 
 
 def test_c81_holds_the_polars_at_the_operating_point(job: Job, tmp_path: Path) -> None:
-    got, want = _again("c81", job.case, tmp_path, 10_000.0, 8.0)
-    scale = 1.225 * (10_000.0 / 60.0) ** 2 * 0.254**4
-    assert got.thrust_N / scale == pytest.approx(want.thrust_N / scale, abs=1e-6)
-    assert got.torque_Nm / scale == pytest.approx(want.torque_Nm / scale, abs=1e-6)
+    same_coefficients(*_again("c81", job.case, tmp_path, 10_000.0, 8.0), 10_000.0, 0.254)
 
 
 def test_a_fan_that_dfdc_holds_comes_back_with_its_duct(fan: Job, tmp_path: Path) -> None:
@@ -646,10 +645,7 @@ def test_a_fan_that_dfdc_holds_comes_back_with_its_duct(fan: Job, tmp_path: Path
     assert held.duct() is not None
     for k, V in enumerate((0.0, 30.0)):
         (tmp_path / str(k)).mkdir()
-        got, want = _again("dfdc", held, tmp_path / str(k), rpm, V)
-        scale = 1.225 * (rpm / 60.0) ** 2 * fan.loading.R**4 * 16.0
-        assert got.thrust_N / scale == pytest.approx(want.thrust_N / scale, abs=1e-6)
-        assert got.torque_Nm / scale == pytest.approx(want.torque_Nm / scale, abs=1e-6)
+        same_coefficients(*_again("dfdc", held, tmp_path / str(k), rpm, V), rpm, 2.0 * fan.loading.R)
 
 
 def test_dfdc_puts_the_rotor_where_the_case_has_it(fan: Job, tmp_path: Path) -> None:

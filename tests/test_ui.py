@@ -25,7 +25,7 @@ pytest.importorskip("streamlit", reason="the extra [ui] is not installed")
 sync = pytest.importorskip("websockets.sync.client", reason="websockets, which steers the browser, is not installed")
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 pytestmark = pytest.mark.skipif(BROWSER is None, reason="no chromium")
-WAIT_S = 90.0
+WAIT_S = 300.0
 
 
 def free_port() -> int:
@@ -97,7 +97,7 @@ def page_and_browser(tmp_path_factory: pytest.TempPathFactory, project: Path) ->
     finally:
         for process in started:
             os.killpg(process.pid, signal.SIGTERM)
-            process.wait(timeout=20)
+            process.wait(timeout=120)
 
 
 @pytest.fixture
