@@ -95,10 +95,6 @@ def reduce(
     if not set(LOADS) & rec.values.keys():
         got = "no thrust, torque, power, current or coefficient with a unit"
         hint = "Name units in the headings or in a recording.toml" + in_one_step(records[0])
-        if records[0].kind == "flight":
-            hint = (
-                "Nothing on board weighs the thrust: give a table with thrust_N, mass times acceleration per propeller"
-            )
         raise InputError(Fault(name, "", got, "one of them", hint))
     samples, reason = (
         is_samples(rec) if steady is None else (not steady, f"rows are taken as {'points' if steady else 'samples'}")
