@@ -126,7 +126,7 @@ _RUN = re.compile(r"[a-z]{0,3}\d{3,5}[a-z]{0,3}", re.IGNORECASE)
 _FILE = re.compile(r"[a-z][a-z0-9]*(?:-[a-z0-9]+)*", re.IGNORECASE)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class UiucName:
     """What the name of a propeller says."""
 

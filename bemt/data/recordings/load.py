@@ -23,7 +23,7 @@ from bemt.data.readers.cfd_run import KIND as RUN
 from bemt.data.readers.cfd_run import RunHead, RunToml
 from bemt.data.readers.marks import EXPORT
 from bemt.data.readers.split import some
-from bemt.data.readers.uiuc_tables import NO_SPEED
+from bemt.data.readers.uiuc import NO_SPEED
 from bemt.data.recordings import cfd_run
 from bemt.data.recordings.adapt import (
     Choice,
