@@ -17,10 +17,11 @@ from bemt.base import units
 from bemt.base.errors import InputError
 from bemt.base.units import G0
 from bemt.data import readers as importers
-from bemt.data.readers import _large, generic_csv, rcbenchmark, stands
+from bemt.data.readers import _large, generic_csv, rcbenchmark
 from bemt.data.readers.headings import heading, surely_shaft_speed
 from bemt.data.readers.split import NO_VALUE
 from bemt.data.recordings.channels import named
+from bemt.data.recordings.check import check
 from bemt.data.recordings.load import import_file
 from bemt.data.recordings.reduce import reduce, reduction
 from bemt.physics.dataset import Dataset
@@ -398,7 +399,7 @@ def test_a_continuous_record_keeps_its_sparse_channels(write: Write) -> None:
 
 
 def test_tables_carry_their_stated_errors(write: Write) -> None:
-    got = stands.read_jmajew(write(table_text(), "grp01__motor1_prop-9x7_4s_duct_table2.csv"))
+    got = importers.read(write(table_text(), "grp01__motor1_prop-9x7_4s_duct_table2.csv"))
     assert len(got) == 9 and got.unit("thrust_err_N") == "N"
     assert np.allclose(got["thrust_err_N"], 0.5 * units.KGF * 1e-3)
     assert np.allclose(got["torque_Nm"], 5e-11 * units.KGF * got["rpm"] ** 2, rtol=1e-5)
@@ -409,15 +410,20 @@ def test_tables_carry_their_stated_errors(write: Write) -> None:
 def test_units_that_the_table_contradicts_are_doubted(write: Write) -> None:
     lines = table_text().split("\n")
     milli = [",".join([*c[:9], f"{float(c[9]) * 1000:g}", *c[10:]]) for c in (t.split(",") for t in lines[1:-1])]
-    got = stands.read_jmajew(write("\n".join([lines[0], *milli]) + "\n"))  # current in mA
-    assert said(got, "pin is 0.001 times v x a (the factor of kilo") and said(got, "in doubt")
+    found = check(importers.read(write("\n".join([lines[0], *milli]) + "\n")))  # current in mA
+    (slip,) = [f for f in found if f.id == "current_unit"]
+    assert slip.severity == "error" and "electrical power over voltage x current is 0.001, must be 1" in slip.evidence
+    assert slip.correction.startswith("current_A: mA taken for A: multiply by 0.001")
+    theff = [",".join([*c[:12], f"{float(c[12]) / 9.80665:g}"]) for c in (t.split(",") for t in lines[1:-1])]
+    found = check(importers.read(write("\n".join([lines[0], *theff]) + "\n", "b.csv")))  # efficacy in another unit
+    assert any(f.severity == "error" and "thrust over (efficacy x electrical power)" in f.evidence for f in found)
 
 
 def test_rpm_of_the_raw_record_is_traced_to_telemetry(write: Write) -> None:
-    got = stands.read_jmajew(write(raw_text()))
+    got = importers.read(write(raw_text()))
     assert got.provenance["form"] == "raw" and said(got, "over 7 pole pairs, not a separate sensor")
     assert got.unit("Strain_Gauge_Thrust") == "" and got.unit("ESCT_RPM") == ""
-    assert not said(stands.read_jmajew(write(raw_text().replace(",600,", ",500,"), "b.csv")), "telemetry of")
+    assert not said(importers.read(write(raw_text().replace(",600,", ",500,"), "b.csv")), "telemetry of")
 
 
 # ---------------------------------------------------------------- any table
