@@ -24,29 +24,29 @@ from bemt.data.readers.cfd_run import RunToml
 from bemt.data.readers.headings import channel_of, heading, meanings
 from bemt.data.readers.marks import EXPORT
 from bemt.data.recordings.cfd_files import (
+    CHANNEL,
+    COEFFICIENTS,
     PROGRAMS,
     WALLS,
+    LoadColumn,
     Settled,
     cfd_files,
     clock_of,
+    columns_of,
+    other_than_loads,
     read_run,
     settled,
     y_plus,
     zone_of,
 )
 from bemt.data.recordings.cfd_loads import (
-    CHANNEL,
-    COEFFICIENTS,
     NET,
     TURNS,
-    LoadColumn,
     OpenRun,
     across,
     by_zone,
-    columns_of,
     counted_zones,
     other_axes,
-    other_than_loads,
     same_shaft,
 )
 from bemt.data.recordings.cfd_setup import (

@@ -33,8 +33,7 @@ from bemt.data.recordings.adapt import (
     is_recording,
     reduction_of,
 )
-from bemt.data.recordings.cfd_files import PROGRAMS, cfd_files
-from bemt.data.recordings.cfd_loads import other_than_loads
+from bemt.data.recordings.cfd_files import PROGRAMS, cfd_files, other_than_loads
 from bemt.data.recordings.grid_study import merged, of_table
 from bemt.data.recordings.reduce import reduction
 from bemt.data.recordings.shown import INTERNAL, Imported, ImportedFile
