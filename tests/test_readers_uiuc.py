@@ -92,17 +92,17 @@ def test_groups_geometry_static_and_lines(tmp_path: Path) -> None:
     (prop,) = sound(tmp_path)
     assert (prop.name, prop.family, prop.blades) == ("apce_10x5", "apce", 2)
     assert prop.geometry is not None and prop.geometry.origin == "own" and prop.geometry.beta_deg[2] == 15.0
-    (static,) = prop.statics
-    assert static.rpm.tolist() == [2000.0, 4000.0] and static.run == "pg0827"
+    static = prop.static
+    assert static is not None and static.rpm.tolist() == [2000.0, 4000.0] and static.run == "pg0827"
     assert [line.rpm for line in prop.lines] == [4014.0, 6014.0]
     assert prop.lines[0].rows == (2, 3, 4) and Path(prop.lines[0].file).name == "apce_10x5_pg0828_4014.txt"
     assert prop.diameter_m == pytest.approx(0.254)
 
 
-def test_two_static_runs_are_kept(tmp_path: Path) -> None:
+def test_two_static_runs_are_joined(tmp_path: Path) -> None:
     write(tmp_path, apce_10x5_static_a1234=STATIC, apce_10x5_static_b1235=STATIC)
     (prop,) = sound(tmp_path)
-    assert [s.rpm.tolist() for s in prop.statics] == 2 * [[2000.0, 4000.0]]
+    assert len(prop.statics) == 2 and prop.static is not None and len(prop.static.rpm) == 4
 
 
 def test_shared_rotated_and_design_geometry(tmp_path: Path) -> None:
@@ -225,7 +225,7 @@ def test_foreign_files_are_named_not_swallowed(tmp_path: Path) -> None:
 def test_the_extension_decides_nothing(tmp_path: Path) -> None:
     (tmp_path / "apce_9x6_static_1ab.dat").write_text(STATIC)
     (prop,) = sound(tmp_path)
-    assert len(prop.statics) == 1
+    assert prop.static is not None
     assert isinstance(importers.read(tmp_path / "apce_9x6_static_1ab.dat"), uiuc.UiucStatic)
 
 

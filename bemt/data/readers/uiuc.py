@@ -277,6 +277,17 @@ class UiucPropeller(UiucName):
         """Nominal diameter. [m]."""
         return self.diameter_in * 0.0254
 
+    @property
+    def static(self) -> UiucStatic | None:
+        """All static points as one table, or None; files joined by ``+``."""
+        if len(self.statics) < 2:
+            return self.statics[0] if self.statics else None
+        tables = self.statics
+        rpm, CT, CP = (np.concatenate([getattr(t, name) for t in tables]) for name in ("rpm", "CT", "CP"))
+        file, sha256 = ("+".join(getattr(t, name) for t in tables) for name in ("file", "sha256"))
+        rows, flags = sum((t.rows for t in tables), ()), sum((t.flags for t in tables), ())
+        return UiucStatic(file, sha256, rows, flags, rpm, CT, CP)
+
 
 @dataclass(frozen=True, eq=False)
 class UiucFolder:

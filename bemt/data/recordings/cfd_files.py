@@ -290,8 +290,6 @@ def columns_of(file: str, record: Dataset, several: bool) -> list[LoadColumn]:
         if name in clock or _ASIDE.match(name):
             continue
         match = re.fullmatch(r"(.+?)\s*\(([^()]*)\)", name) if form != "openfoam_forces" else None
-        if form == "fluent_transcript" and match is None:  # residuals
-            continue
         stem, zone = (match[1], match[2]) if match else (name, home)
         part, axis = "", ""
         for word, pattern in (("force", _FORCE), ("moment", _MOMENT)):
