@@ -12,7 +12,6 @@ Comma-separated, one heading line that names the units::
 * The Flight Stand software writes ``Powertrain 1 - rotation speed (rpm)``: one speed, whose sensor it does not name.
 * Two motors on one stand are ``Thrust A``, ``Thrust B``, or powertrains 1 and 2. If only one of them turned, its
   columns get the plain names; two that turned keep their letters, and the user says which one a recording is about.
-* ``Mechanical Power`` is torque times one of the speeds; which one is found from the numbers and reported.
 * Rows with 0 rpm, spikes, and times that go backwards are kept and flagged.
 """
 
@@ -26,7 +25,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from bemt.base import units
 from bemt.base.arrays import Array
 from bemt.base.tables import number_of
 from bemt.data.readers import head_text, number
@@ -82,7 +80,6 @@ def read(path: str | os.PathLike[str]) -> Dataset:
     said = {"stand": "RCbenchmark / Tyto", "mode": _mode(build)}
     build.flag_time()
     _speeds(build)
-    _power(build)
     if said["mode"] == "continuous":
         build.flag_spikes("thrust_N", "torque_Nm", "current_A", "voltage_V")
     build.check_magnitudes()
@@ -199,19 +196,3 @@ def _wild(v: Array, load: Array | None) -> np.ndarray:
         if np.count_nonzero(good) >= 5:
             out[good] = against_load(v[good], load[good]) < 1.0 / MISREAD
     return out
-
-
-def _power(build: Builder) -> None:
-    """Tell which speed the mechanical power was computed with; the sanity checks look at its size."""
-    power, torque = build.at("mechanical_power_W"), build.at("torque_Nm")
-    same: list[str] = []
-    for name in (*_SPEEDS, "rpm"):
-        speed = build.at(name)
-        if power is None or torque is None or speed is None:
-            continue
-        product = np.abs(torque) * speed * units.RPM
-        good = (product > 0.05 * np.nanmax(np.append(product, 0.0))) & (power > 0)
-        if np.count_nonzero(good) >= 3 and math.isclose(np.median(power[good] / product[good]), 1.0, rel_tol=0.02):
-            same.append(name)
-    if same:
-        build.warnings.append(Remark(f"mechanical_power_W is torque times {' and '.join(same)}"))

@@ -57,15 +57,7 @@ def cfd_files(folder: Path) -> tuple[Path, ...]:
         found = (post if post.is_dir() else folder).glob("*/*/*.dat")
     else:
         found = folder.glob("*/*.dat" if folder.parent.name == "postProcessing" else "*")
-    files = sorted(p for p in found if p.is_file())
-    out = []
-    for path in files:
-        try:
-            if readers.detect(path) in PROGRAMS:
-                out.append(path)
-        except InputError:
-            continue
-    return tuple(out)
+    return tuple(p for p in sorted(found) if p.is_file() and readers.kind_of(p) in PROGRAMS)
 
 
 def y_plus(files: Sequence[Path]) -> dict[str, float]:

@@ -89,10 +89,7 @@ def run_at(path: str, rpm: float | None = None, airspeed_m_s: float | None = Non
     elif not made.is_file():
         return None
     else:
-        try:
-            kind = readers.detect(made)
-        except InputError:  # said where the file is read
-            return None
+        kind = readers.kind_of(made)
         if kind == "cfd_run":
             run = readers.read(made, kind)
             twice = [k for k in told if getattr(run.run, k) not in (None, told[k])]

@@ -159,13 +159,7 @@ def as_stated(files: Sequence[Any], run: Mapping[str, Any]) -> list[Any]:
 
 def is_measured(file: Any) -> bool:
     """Whether a file is a table of measurements, of whose columns units, headings and signs may be stated."""
-    if not isinstance(file, str) or Path(file).is_dir():
-        return False
-    try:
-        kind = importers.detect(file)
-    except InputError:
-        return False
-    return kind not in PROGRAMS and kind != RUN
+    return isinstance(file, str) and not Path(file).is_dir() and importers.kind_of(file) not in ("", RUN, *PROGRAMS)
 
 
 def _stated(
