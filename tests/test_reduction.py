@@ -7,6 +7,7 @@ import math
 import random
 import re
 from collections import defaultdict
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +25,7 @@ from bemt.data.recordings.points import is_samples
 from bemt.data.recordings.reduce import reduce, reduction
 from bemt.physics import coefficients as co
 from bemt.physics.air import Air
-from bemt.physics.dataset import Dataset
+from bemt.physics.dataset import Dataset, concat
 
 D = 0.254
 K_T, K_Q = 2.0e-7, 3.0e-9
@@ -36,6 +37,13 @@ def recording(values: dict[str, np.ndarray], **more: object) -> Dataset:
         "bench", "table", values, lines=lines, units={"humidity": "-", "electrical_rpm": "rpm", "optical_rpm": "rpm"},
         **more,
     )  # fmt: skip
+
+
+def together(runs: list[Dataset]) -> Dataset:
+    """Runs one after the other, numbered, as a recording.toml with several files has them."""
+    whole = concat(runs, "runs")
+    run = np.repeat(np.arange(1.0, len(runs) + 1.0), [len(part) for part in runs])
+    return replace(whole, values={**whole.values, "run": run})
 
 
 def noise(rng: np.random.Generator, n: int, sd: float, r: float = 0.0) -> np.ndarray:
@@ -336,13 +344,13 @@ def test_runs_that_differ_at_equal_speed_show_their_session_scatter() -> None:
         rpm = np.linspace(3000.0, 9000.0, 15) * (1 + 0.004 * k)
         thrust = K_T * (1 + 0.1 * (rpm / 9000)) * rpm**2 * (1 + gain) * (1 + 0.003 * rng.standard_normal(15))
         runs.append(recording({"rpm": rpm, "thrust_N": thrust}))
-    got = reduce(runs)
+    got = reduce(together(runs))
     assert reduction(got).correlated["thrust_N"]["session"] == pytest.approx(np.std(gains, ddof=1), rel=0.15)
     assert got["run"].tolist() == [float(k) for k in range(1, 7) for _ in range(15)]
-    same = reduce([runs[0], runs[0]])
+    same = reduce(together([runs[0], runs[0]]))
     assert reduction(same).correlated["thrust_N"]["session"] == pytest.approx(0.0, abs=1e-9)
     apart = {"rpm": np.linspace(12000.0, 15000.0, 5), "thrust_N": np.linspace(30.0, 40.0, 5)}
-    assert "session" not in reduction(reduce([runs[0], recording(apart)])).correlated.get("thrust_N", {})
+    assert "session" not in reduction(reduce(together([runs[0], recording(apart)]))).correlated.get("thrust_N", {})
 
 
 def test_a_misread_speed_is_left_out_and_the_row_kept() -> None:
@@ -487,9 +495,8 @@ def test_runs_of_one_condition_agree_within_the_errors_that_their_maker_states(s
                     u = np.sqrt(b.u[channel][inside] ** 2 + at[1] ** 2 + speed**2)
                     z += list((y - at[0] * x**2) / u)
         assert len(z) > 800 and np.mean(np.abs(z) < 2) > 0.98 and np.mean(np.abs(z) < 1) > 0.85, channel
-    joined = reduce(
-        [importers.read(f) for f in sorted((shared_data / "jmajew").glob("grp01__f1507_hqprop76x8_4s_table*.csv"))]
-    )
+    files = sorted((shared_data / "jmajew").glob("grp01__f1507_hqprop76x8_4s_table*.csv"))
+    joined = reduce(together([importers.read(f) for f in files]))
     assert (
         reduction(joined).correlated["thrust_N"]["session"] < 0.01
         and reduction(joined).correlated["torque_Nm"]["session"] < 0.01

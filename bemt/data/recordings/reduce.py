@@ -31,8 +31,6 @@ from bemt.data.recordings.channels import (
     in_one_step,
     lost,
     named,
-    names_of,
-    runs_of,
     shaft_power,
     stated,
 )
@@ -50,7 +48,7 @@ from bemt.data.recordings.points import (
 from bemt.data.recordings.scatter import Hysteresis, hysteresis, repeats, session
 from bemt.physics import coefficients as co
 from bemt.physics.air import AIR_C, GAMMA, R_DRY, Air
-from bemt.physics.dataset import Dataset, concat
+from bemt.physics.dataset import Dataset
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,9 +74,7 @@ def reduction(points: Dataset) -> Reduction:
 
 
 @np.errstate(all="ignore")  # a damaged file may hold any number; what is not finite becomes NaN or a refusal
-def reduce(
-    recording: Dataset | Sequence[Dataset], *, diameter_m: float | None = None, steady: bool | None = None
-) -> Dataset:
+def reduce(recording: Dataset, *, diameter_m: float | None = None, steady: bool | None = None) -> Dataset:
     """Reduce a recording to steady points: kind ``bench``, uncertainties the uncorrelated part, `reduction` of them.
 
     >>> values = {"rpm": [5000.0, 6000.0], "thrust_N": [4.0, 5.8], "density_kg_m3": [1.225, 1.225]}
@@ -86,15 +82,11 @@ def reduce(
     >>> reduction(got).mode, got["CT"].round(3).tolist()
     ('points', [0.113, 0.114])
     """
-    records = [recording] if isinstance(recording, Dataset) else list(recording)
-    if not records:
-        raise InputError(Fault("", "recordings", "none", "one or more"))
-    name = records[0].file or records[0].name
-    rec = _trusted(_joined([named(record) for record in records]))
-    constants = {k: v for record in reversed(records) for k, v in record.constants.items()}
+    name, constants = recording.file or recording.name, recording.constants
+    rec = _trusted(named(recording))
     if not set(LOADS) & rec.values.keys():
         got = "no thrust, torque, power, current or coefficient with a unit"
-        hint = "Name units in the headings or in a recording.toml" + in_one_step(records[0])
+        hint = "Name units in the headings or in a recording.toml" + in_one_step(recording)
         raise InputError(Fault(name, "", got, "one of them", hint))
     samples, reason = (
         is_samples(rec) if steady is None else (not steady, f"rows are taken as {'points' if steady else 'samples'}")
@@ -111,13 +103,13 @@ def reduce(
     for key, constant in (("tip_gap_m", "gap_m"), ("wall_distance_m", "wall_distance_m")):
         if key not in values and constant in constants:
             values[key] = np.full(len(found.points), constants[constant])
-    correlated = _instrument(records, rec, values, u)
+    correlated = _instrument(recording, rec, values, u)
     drift = _subtract(found, values, correlated, notes)
     surroundings = air_of(values, len(found.points), constants)
     notes += surroundings.notes
     _fill_scatter(found, values, u, correlated, notes)
     diameter = diameter_m if diameter_m is not None else constants.get("diameter_m")
-    series = _series(records, found, rec, values, u, surroundings, diameter)
+    series = _series(recording, found, rec, values, u, surroundings, diameter)
     loops = _hysteresis(found, values, rec, notes)
     how = Reduction(
         "samples" if samples else "points", reason, {k: dict(v) for k, v in correlated.items() if v},
@@ -125,24 +117,6 @@ def reduce(
         loops, drift,
     )  # fmt: skip
     return replace(series, provenance={**series.provenance, "reduction": how}, notes=tuple(notes))
-
-
-def _joined(parts: Sequence[Dataset]) -> Dataset:
-    """Runs one after the other, numbered through."""
-    if len(parts) == 1:
-        return parts[0]
-    run, k = [], 0
-    for v in parts:
-        labels, index = np.unique(runs_of(v), return_inverse=True)
-        run.append(k + 1.0 + index)
-        k += len(labels)
-    whole = concat([replace(v, kind="bench") for v in parts])
-    about = {
-        **parts[0].provenance,
-        "dropped": sum((dropped(v) for v in parts), ()),
-        "names": {a: b for v in parts for a, b in names_of(v).items()},
-    }
-    return replace(whole, values={**whole.values, "run": np.concatenate(run)}, provenance=about)
 
 
 def _trusted(rec: Dataset) -> Dataset:
@@ -218,16 +192,15 @@ def _shared(values: Mapping[str, Array], u: Mapping[str, Array]) -> list[str]:
 
 
 def _instrument(
-    records: Sequence[Dataset], rec: Dataset, values: Mapping[str, Array], u: dict[str, Array]
+    recording: Dataset, rec: Dataset, values: Mapping[str, Array], u: dict[str, Array]
 ) -> dict[str, dict[str, float]]:
     """Correlated parts as stated; the sample part goes into `u` where it is larger than what is there."""
-    out: dict[str, dict[str, float]] = {key: {} for key in values}
+    out: dict[str, dict[str, float]] = {}
     for key in values:
-        for record in records:
-            told = record.provenance.get("instrument", {}).get(file_name(rec, key), {})
-            out[key] |= {part: told[part] for part in ("gain", "zero") if part in told}
-            if "sample" in told:
-                u[key] = np.fmax(u[key], told["sample"])
+        told = recording.provenance.get("instrument", {}).get(file_name(rec, key), {})
+        out[key] = {part: told[part] for part in ("gain", "zero") if part in told}
+        if "sample" in told:
+            u[key] = np.fmax(u[key], told["sample"])
     return out
 
 
@@ -295,7 +268,7 @@ def _fill_scatter(
 
 
 def _series(
-    records: Sequence[Dataset], found: Found, rec: Dataset, values: Mapping[str, Array], u: Mapping[str, Array],
+    recording: Dataset, found: Found, rec: Dataset, values: Mapping[str, Array], u: Mapping[str, Array],
     air: AirOfPoints, diameter: float | None,
 ) -> Dataset:  # fmt: skip
     """Channels and derived ones, as a `Dataset`."""
@@ -305,8 +278,8 @@ def _series(
         shown["run"] = np.array([p.run for p in found.points])
     if np.any(np.isfinite(air.rho)):
         shown["density_kg_m3"] = air.rho
-    said = records[0].provenance
-    file = str(said.get("file", records[0].name))
+    said = recording.provenance
+    file = str(said.get("file", recording.name))
     short = file.replace("\\", "/").rsplit("/", 1)[-1]
     labels = []
     for p in found.points:
