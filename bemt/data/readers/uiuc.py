@@ -95,7 +95,6 @@ class UiucStatic(_UiucTable):
     rpm: Array
     CT: Array
     CP: Array
-    run: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +106,6 @@ class UiucLine(_UiucTable):
     CT: Array
     CP: Array
     eta: Array
-    run: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,16 +213,14 @@ def read_static(path: str | os.PathLike[str]) -> UiucStatic:
     """Read one static run (header ``RPM CT CP``); rows stay in the recorded order, flagged where rpm goes back."""
     source = load_text(path)
     (rpm, CT, CP), rows = _parse(source, "static")
-    name = parse_file_name(Path(path).stem)
-    run = name.run if name and name.role == "static" else ""
-    return UiucStatic(source.name, source.sha256, rows, _order_flags(rpm, "rpm"), rpm, CT, CP, run)
+    return UiucStatic(source.name, source.sha256, rows, _order_flags(rpm, "rpm"), rpm, CT, CP)
 
 
-def read_line(path: str | os.PathLike[str], rpm: float | None = None) -> UiucLine:
+def read_line(path: str | os.PathLike[str]) -> UiucLine:
     """Read one advance-ratio run (header ``J CT CP eta``)."""
     source = load_text(path)
     name = parse_file_name(Path(path).stem)
-    speed = rpm if rpm is not None else (name.rpm if name and name.role == "line" else None)
+    speed = name.rpm if name else None
     if speed is None or not 100.0 <= speed <= 200000.0:
         got = NO_SPEED if speed is None else f"rpm {speed:g}"
         hint = "Name the file <family>_<size>_<run>_<rpm>.txt"
@@ -244,8 +240,7 @@ def read_line(path: str | os.PathLike[str], rpm: float | None = None) -> UiucLin
         source.refuse(rows[bad[0]], got, "eta = J CT/CP", hint)
     order = _order_flags(J, "J")
     flags = tuple(f + (("eta is not J CT/CP",) if o else ()) for f, o in zip(order, odd, strict=True))
-    run = name.run if name and name.role == "line" else ""
-    return UiucLine(source.name, source.sha256, rows, flags, float(speed), J, CT, CP, eta, run)
+    return UiucLine(source.name, source.sha256, rows, flags, float(speed), J, CT, CP, eta)
 
 
 def read_thickness(path: str | os.PathLike[str]) -> UiucThickness:

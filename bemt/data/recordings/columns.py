@@ -292,19 +292,14 @@ def lengths(facts: Facts) -> Iterator[Finding]:
         asked.append(("diameter_m", D, 0.015, 12.0))
         if pitch is not None:
             asked.append(("pitch_m", pitch, 0.15 * D, 3.0 * D))
-    for name, low, high in (("tip_gap_m", 1e-5, 0.03), ("wall_distance_m", 0.02, 100.0)):
+    scale = D if D is not None and 0.015 <= D <= 12.0 else None
+    for name, low, high, of in (
+        ("tip_gap_m", 1e-5, 0.03, (5e-5, 0.125)),
+        ("wall_distance_m", 0.02, 100.0, (0.05, 500.0)),
+    ):
         v = facts.get(name)
-        top = float(np.nanmax(np.abs(v))) if v is not None else 0.0
-        if v is not None and top > 0.0:
-            scale = D if D is not None and 0.015 <= D <= 12.0 else None
-            bounds = (
-                (low, high)
-                if scale is None
-                else (scale / 2e4, scale / 8)
-                if name == "tip_gap_m"
-                else (scale / 20, 500 * scale)
-            )
-            asked.append((name, top, *bounds))
+        if v is not None and (top := float(np.nanmax(np.abs(v)))) > 0.0:
+            asked.append((name, top, *((low, high) if scale is None else (of[0] * scale, of[1] * scale))))
     for name, value, low, high in asked:
         if low <= value <= high:
             continue
