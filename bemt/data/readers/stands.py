@@ -239,7 +239,7 @@ class StandTable:
             if usual is not None:
                 build.add_usual(k, *usual)
             elif self.others:
-                build.add(k, Heading(text, slug(text), None, self.others))
+                build.add(k, Heading(text, slug(text) or "column", None, self.others))
         build.check()
         build.need(*self.needs)
         build.check()
