@@ -313,9 +313,11 @@ def test_the_two_speeds_are_kept_apart(write: Write) -> None:
     assert said(got, "optical_rpm is 0 in every row")
     assert np.all(got["optical_rpm"] == 0.0)
     got = rcbenchmark.read(write(rc_text(optical=1 / 7), "poles.csv"))
-    assert said(got, "electrical over optical speed: median 7") and said(got, "were 7 pole pairs left out?")
-    assert np.allclose(got["electrical_rpm"], 7 * got["optical_rpm"])
-    assert not said(rcbenchmark.read(write(rc_text(optical=1.0), "same.csv")), "left out")
+    assert np.allclose(got["electrical_rpm"], 7 * got["optical_rpm"]) and said(got, "derived from the motor's phases")
+    (ratio,) = [f for f in check(got) if f.id == "rpm_ratio"]
+    assert ratio.severity == "error" and "7 pole pairs" in ratio.correction
+    same = rcbenchmark.read(write(rc_text(optical=1.0), "same.csv"))
+    assert not said(same, "motor's phases") and "rpm_ratio" not in {f.id for f in check(same)}
 
 
 def test_rpm_zero_and_spikes_are_kept_and_flagged(write: Write) -> None:
@@ -378,7 +380,7 @@ def test_a_stopped_motor_whose_load_cell_is_off_is_not_under_thrust(write: Write
 def test_signs_and_backward_time_are_reported_not_repaired(write: Write) -> None:
     text = rc_text(torque=-1.0).replace("\n3.5,", "\n-0.2,")
     got = rcbenchmark.read(write(text))
-    assert said(got, "torque_Nm is mostly negative") and np.all(got["torque_Nm"] < 0)
+    assert ("sign_flipped", "torque_Nm") in {(f.id, f.channel) for f in check(got)} and np.all(got["torque_Nm"] < 0)
     assert got.flags[1] == ("time goes backwards",) and got["time_s"][1] == -0.2
 
 
