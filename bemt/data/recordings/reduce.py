@@ -55,16 +55,13 @@ from bemt.physics.dataset import Dataset
 class Reduction:
     """How points were made of rows; `provenance["reduction"]` of what `reduce` gives."""
 
-    # ``samples`` or ``points``, and what decided it
-    mode: str
-    reason: str
+    mode: str  # ``samples`` or ``points``
     # By channel: ``gain`` [1], ``zero`` [unit of the channel], ``session`` [1], as far as known
     correlated: Mapping[str, Mapping[str, float]]
     dropped: tuple[DroppedCells, ...]  # Line, channel ("" for the whole row) and reason of everything that was left out
     rows: tuple[NDArray[np.intp], ...]  # (M,) rows of the recording in each point
     directions: tuple[str, ...]  # ``first``, ``up`` or ``down`` per point
     hysteresis: Mapping[str, Hysteresis]  # By channel, where both branches were recorded
-    drift: Mapping[str, float]  # Change of the zero from first to last rest, by channel [unit of the channel]
 
 
 def reduction(points: Dataset) -> Reduction:
@@ -104,7 +101,7 @@ def reduce(recording: Dataset, *, diameter_m: float | None = None, steady: bool 
         if key not in values and constant in constants:
             values[key] = np.full(len(found.points), constants[constant])
     correlated = _instrument(recording, rec, values, u)
-    drift = _subtract(found, values, correlated, notes)
+    _subtract(found, values, correlated, notes)
     surroundings = air_of(values, len(found.points), constants)
     notes += surroundings.notes
     _fill_scatter(found, values, u, correlated, notes)
@@ -112,9 +109,9 @@ def reduce(recording: Dataset, *, diameter_m: float | None = None, steady: bool 
     series = _series(recording, found, rec, values, u, surroundings, diameter)
     loops = _hysteresis(found, values, rec, notes)
     how = Reduction(
-        "samples" if samples else "points", reason, {k: dict(v) for k, v in correlated.items() if v},
+        "samples" if samples else "points", {k: dict(v) for k, v in correlated.items() if v},
         (*dropped(rec), *found.lost), tuple(p.rows for p in found.points), tuple(p.direction for p in found.points),
-        loops, drift,
+        loops,
     )  # fmt: skip
     return replace(series, provenance={**series.provenance, "reduction": how}, notes=tuple(notes))
 
@@ -206,12 +203,11 @@ def _instrument(
 
 def _subtract(
     found: Found, values: dict[str, Array], correlated: dict[str, dict[str, float]], notes: list[str]
-) -> dict[str, float]:
-    """Subtract the zero; gives its drift."""
-    drift: dict[str, float] = {}
+) -> None:
+    """Subtract the zero of the load cells."""
     loads = [name for name in TARED if name in values]
     if not loads:
-        return drift
+        return
     top = {name: float(np.nanmax(np.abs(values[name]))) for name in loads}
 
     def take(zero: TareZero, rows: NDArray[np.intp]) -> None:
@@ -221,9 +217,6 @@ def _subtract(
                 values[name][rows] -= zero.value[name]
                 part = correlated[name]
                 part["zero"] = math.hypot(part.get("zero", 0.0), zero.u[name])
-        for name, change in zero.drift.items():
-            if name in loads:
-                drift[name] = max(change, drift.get(name, change), key=abs)
         notes.extend(n for n in zero.notes if n.split(":")[0] in loads)
 
     runs = np.array([p.run for p in found.points])
@@ -236,7 +229,6 @@ def _subtract(
         notes.append("no rows with the motor stopped: the zero of the load cells is unknown, nothing was subtracted")
     elif bare := sorted(set(runs.tolist()) - found.rests.keys()):
         notes.append(f"runs without a motor stop, nothing subtracted: {', '.join(f'{r:g}' for r in bare)}")
-    return drift
 
 
 def _fill_scatter(
