@@ -374,9 +374,8 @@ def _collect(files: list[tuple[Path, UiucFile]], faults: list[Fault]) -> Iterato
     for key, name in sorted(names.items()):
         folder = os.fspath(next(file for file, told in files if told.propeller.name == key).parent)
         if name.faults:
-            faults.extend(
-                Fault(f"{folder}/{key}_* ({number_of(counts[key], 'file')})", "name", *fault) for fault in name.faults
-            )
+            where = f"{folder}/{key}_* ({number_of(counts[key], 'file')})"
+            faults += [Fault(where, "name", *fault) for fault in name.faults]
             continue
         if key == name.family or name.diameter_in is None:  # the design of a family is no propeller of its own
             continue

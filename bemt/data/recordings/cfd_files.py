@@ -176,10 +176,8 @@ def settled(
         index = index[time[index] <= end * (1.0 + 1e-9)]
         step = float(np.median(np.diff(time[index]))) if index.size > 1 else 0.0
         if step > period / MIN_ROWS:
-            clock, coarse = (
-                "iteration",
-                f"; {step:.3g} s a row, {period / step:.2g} rows a revolution: taken for iterations",
-            )
+            clock = "iteration"
+            coarse = f"; {step:.3g} s a row, {period / step:.2g} rows a revolution: taken for iterations"
     if clock == "time":
         found = revolution_average(time[index], values[index], period, revolutions)
         if found.mean is None:
@@ -304,13 +302,8 @@ def other_than_loads(names: Iterable[str]) -> str:
     ('residuals', '', '')
     """
     own = list(names)
-    loads = (
-        _FORCE,
-        _MOMENT,
-        _COEFFICIENT,
-        *(re.compile(_WORDS[q], re.IGNORECASE) for q in ("thrust", "torque", "power")),
-    )
-    if any(pattern.search(name) for name in own for pattern in loads):
+    words = [re.compile(_WORDS[q], re.IGNORECASE) for q in ("thrust", "torque", "power")]
+    if any(pattern.search(name) for name in own for pattern in (_FORCE, _MOMENT, _COEFFICIENT, *words)):
         return ""
     return next((what for what, pattern in _OTHER.items() if any(map(pattern.search, own))), "")
 

@@ -174,19 +174,15 @@ class OpenRun:
             elif quantity == "duct_thrust":
                 sign = out.get("thrust", 1.0)
             elif value < 0 and flies and quantity == "thrust" and brakes:
-                sign, why = (
-                    1.0,
-                    f"as a pull it would give {slowest * abs(value) / shaft:.3g} times the power of the shaft",
-                )
-                self.notes.append(f"{name} is {value:.4g} in the file: kept, since {why}")
+                sign, times = 1.0, f"{slowest * abs(value) / shaft:.3g} times the power of the shaft"
+                self.notes.append(f"{name} is {value:.4g} in the file: kept, since as a pull it would give {times}")
             elif value < 0 and flies and (brakes or quantity == "thrust" or "thrust" not in loads):
                 got, may = f"{value:.4g} in the file at {slowest:.4g} m/s", "its sign: in flight a rotor may brake"
                 may += "" if quantity == "thrust" else ", and the flow may drive it"
                 self.fault(None, quantity, got, may, f"--sign {quantity}=1 keeps it, --sign {quantity}=-1 turns it")
             elif value < 0:
-                self.notes.append(
-                    f"{name} is {value:.4g} in the file: taken as positive (--sign {quantity}=1 keeps it)"
-                )
+                kept = f"--sign {quantity}=1 keeps it"
+                self.notes.append(f"{name} is {value:.4g} in the file: taken as positive ({kept})")
             out[quantity] = sign
         return out
 

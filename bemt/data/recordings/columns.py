@@ -172,10 +172,8 @@ def sticks(facts: Facts) -> Iterator[Finding]:
                 for k in (*STICKS, "rpm")
                 if k != name and k in facts.values and _varies(facts.values[k][whole])
             ]
-            text = (
-                f"{facts.values[name][rows[0]]:.6g} to the last digit in {whole.size} rows ({where_of(facts, whole)}) "
-            )
-            text += f"while {' and '.join(changes)}"
+            where = f"{whole.size} rows ({where_of(facts, whole)})"
+            text = f"{facts.values[name][rows[0]]:.6g} to the last digit in {where} while {' and '.join(changes)}"
             left = "those rows" if name == "airspeed_m_s" else "those readings"
             fix = f"is the sensor stuck? Measure these points again; {left} are left out, all but the first"
             yield Finding("stuck_sensor", facts.named(name), text, fix, tuple(rows.tolist()), "warning")
@@ -304,9 +302,8 @@ def lengths(facts: Facts) -> Iterator[Finding]:
         if low <= value <= high:
             continue
         fits = [e.words for e in unit_errors.errors("length", rarest=0.5) if low <= value * e.repair <= high]
-        text = f"{value:.5g} m is outside {low:.3g} to {high:.3g} m" + (
-            f" for a rotor of {D:.4g} m" if D is not None and name != "diameter_m" else ""
-        )
+        rotor = f" for a rotor of {D:.4g} m" if D is not None and name != "diameter_m" else ""
+        text = f"{value:.5g} m is outside {low:.3g} to {high:.3g} m{rotor}"
         yield Finding("length_unit", facts.named(name), text, "; or ".join(fits) or "check the length", (), "warning")
 
 

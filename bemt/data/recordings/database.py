@@ -200,9 +200,8 @@ def get(
     from bemt.data.readers.uiuc import scan_folder
 
     if None not in (source, url):
-        raise InputError(
-            Fault("", "--url", str(url), "none with --source, which downloads nothing", "Give one of the two")
-        )
+        expected = "none with --source, which downloads nothing"
+        raise InputError(Fault("", "--url", str(url), expected, "Give one of the two"))
     known = _record(folder)
     if known is None and folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         hint = "Name an empty or new folder with --out"

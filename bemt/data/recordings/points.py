@@ -456,9 +456,8 @@ def _wild(rec: Dataset, data: dict[str, Array], rest: NDArray[np.bool_], found: 
     for name, odd in wild.items():
         for j in np.flatnonzero(odd & ~every):
             i = int(np.flatnonzero(good)[j])
-            found.lost += lost(
-                rec, [i], name, f"misread: {times[name][j] ** 2:.3g} times what its row and the rest show"
-            )
+            reason = f"misread: {times[name][j] ** 2:.3g} times what its row and the rest show"
+            found.lost += lost(rec, [i], name, reason)
             data[name] = _without(data[name], [i])
     ratio = next(iter(times.values()))
     for j in np.flatnonzero(every):

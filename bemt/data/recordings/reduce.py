@@ -85,16 +85,15 @@ def reduce(recording: Dataset, *, diameter_m: float | None = None, steady: bool 
         got = "no thrust, torque, power, current or coefficient with a unit"
         hint = "Name units in the headings or in a recording.toml" + in_one_step(recording)
         raise InputError(Fault(name, "", got, "one of them", hint))
-    samples, reason = (
-        is_samples(rec) if steady is None else (not steady, f"rows are taken as {'points' if steady else 'samples'}")
-    )
+    samples, reason = not steady, f"rows are taken as {'points' if steady else 'samples'}"
+    if steady is None:
+        samples, reason = is_samples(rec)
     found = from_samples(rec, name) if samples else from_rows(rec)
     _outliers(rec, found)
     if not found.points:
         reasons = ", ".join(sorted({gone.reason for gone in found.lost if not gone.channel}))
-        raise InputError(
-            Fault(name, "", f"no steady point in {number_of(len(rec), 'row')} ({reasons or 'no rows'})", "one or more")
-        )
+        got = f"no steady point in {number_of(len(rec), 'row')} ({reasons or 'no rows'})"
+        raise InputError(Fault(name, "", got, "one or more"))
     values, u = _columns(found.points)
     notes = [reason, *rec.notes, *found.notes, *_shared(values, stated(rec))]
     for key, constant in (("tip_gap_m", "gap_m"), ("wall_distance_m", "wall_distance_m")):
@@ -246,12 +245,9 @@ def _fill_scatter(
         if again.dof >= 3 and again.scatter > 0.0:
             missing = ~np.isfinite(u[name])
             u[name] = np.where(missing, again.scatter * np.abs(values[name]), u[name])
-            use = (
-                f"; taken as the uncertainty of {number_of(missing.sum(), 'point')} that state none"
-                if np.any(missing)
-                else ""
-            )
-            notes.append(f"{name}: repeats scatter by {again.scatter:.2%} ({again.dof} degrees of freedom){use}")
+            use = f"; taken as the uncertainty of {number_of(missing.sum(), 'point')} that state none"
+            told = f"{name}: repeats scatter by {again.scatter:.2%} ({again.dof} degrees of freedom)"
+            notes.append(told + (use if np.any(missing) else ""))
         between = session(values[name], rpm, run, _flow(values))
         if math.isfinite(between.scatter):
             correlated[name]["session"] = between.scatter
@@ -358,10 +354,9 @@ def air_of(values: Mapping[str, Array], n: int, constants: Mapping[str, float]) 
         found = _moist(values, temperature)
     if found is not None and np.any(np.isfinite(found.rho)):
         return found
-    note = (
-        "no density: no coefficients; give a column of it, or of pressure and temperature, or [air] in recording.toml"
-    )
-    return AirOfPoints(np.full(n, np.nan), _sound(temperature), (*(found.notes if found else ()), note))
+    ways = "give a column of it, or of pressure and temperature, or [air] in recording.toml"
+    notes = (*(found.notes if found else ()), f"no density: no coefficients; {ways}")
+    return AirOfPoints(np.full(n, np.nan), _sound(temperature), notes)
 
 
 def _sound(temperature: Array) -> Array:
