@@ -6,7 +6,7 @@ step and headings without units::
     out,th,th_err,tq,tq_err,rpm,rpm_err,v,v_err,a,a_err,pin,theff
 
 out [%], th [gf], tq [gf cm], rpm [1/min], v [V], a [A], pin [W], theff [gf/W]; ``_err`` is the stated error in the unit
-of its channel. That these units hold is checked within the file: pin = v a and theff = th/pin.
+of its channel. That these units hold shows in pin = v a and theff = th/pin, which the checks of any recording look at.
 
 Raw records have one row per sample and no time; their headings name units as ``Thrust [G]`` (gram-force), counts of the
 converters have none. ``RPM [1/min]`` is no sensor of its own: it is ``ESCT RPM`` (telemetry, hundreds of electrical
