@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import runpy
-import struct
 import subprocess
 import sys
-import zlib
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +13,6 @@ from flight_files import Hover, broken_copies, dataflash, ulog
 
 from bemt.app.cli import main
 from bemt.base.errors import InputError
-from bemt.base.units import G0
-from bemt.data.recordings.load import import_file
 from bemt.judge.explanation import Explanation
 from bemt.tools.flight import log as flight_log
 from bemt.tools.flight.answer import FlightAnswer, answer_on
@@ -249,40 +245,6 @@ def test_cut_copies_are_read_as_far_as_they_go(tmp_path: Path) -> None:
         (tmp_path / "log").write_bytes(data[:40_000] + bytes([7]) * 50 + data[40_050:])
         log = read_log(tmp_path / "log")
         assert "damaged" in log.ends and log.t[-1] > 11.0
-
-
-def usdlog(rows: int = 40, version: int = 2) -> bytes:
-    """Log of a Crazyflie's card with four speeds, an acceleration and the battery."""
-    names = [f"rpm.m{k}(H)" for k in range(1, 5)] + [f"acc.{a}(f)" for a in "xyz"] + ["pm.vbatMV(H)"]
-    data = struct.pack("<BHHH", 0xBC, version, 1, 7) + b"fixedFrequency\0" + struct.pack("<H", len(names))
-    data += b"".join(n.encode() + b"\0" for n in names)
-    for k in range(rows):
-        data += struct.pack("<HQ" if version == 2 else "<HI", 7, 1000 * k)
-        data += struct.pack("<HHHHfffH", 20000, 20000, 20000, 20000, 0.0, 0.0, 1.0, 3700)
-    return data + struct.pack("<I", zlib.crc32(data))
-
-
-@pytest.mark.parametrize("version", [1, 2])
-def test_a_usdlog_is_read_whole_or_says_where_it_ends_and_import_names_its_command(
-    tmp_path: Path, version: int
-) -> None:
-    path = tmp_path / "flight.usdlog"
-    path.write_bytes(usdlog(version=version))
-    log = read_log(path)
-    assert not log.ends and log.t[-1] - log.t[0] == pytest.approx(0.039)
-    assert log.rpm is not None and np.allclose(log.rpm, 20000.0)
-    assert log.acceleration is not None and np.allclose(log.acceleration[:, 2], G0)
-    assert log.voltage is not None and np.allclose(log.voltage, 3.7)
-    with pytest.raises(InputError, match=f"got Crazyflie usdlog; expected a recording of a stand.*bemt fly {path}"):
-        import_file(path)
-    damaged = bytearray(path.read_bytes())
-    damaged[-20] ^= 0xFF
-    path.write_bytes(bytes(damaged))
-    assert "wrong checksum" in read_log(path).ends
-    path.write_bytes(usdlog()[:40])
-    for read in (read_log, import_file):
-        with pytest.raises(InputError):
-            read(path)
 
 
 @pytest.mark.slow

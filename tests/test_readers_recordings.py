@@ -5,6 +5,8 @@ from __future__ import annotations
 import gzip
 import random
 import re
+import struct
+import zlib
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -1203,6 +1205,40 @@ def test_four_propellers_on_a_scale_are_read_per_propeller(tmp_path: Path) -> No
     assert got["thrust_N"][0] == pytest.approx(8e-3 * G0 / 4)
     assert got["rpm"][0] == pytest.approx(np.sqrt((10000**2 + 12000**2) / 2))
     assert got["throttle"][0] == pytest.approx(20000 / 65535)
+
+
+def flight(rows: int = 20, version: int = 2) -> bytes:
+    names = [f"rpm.m{k}(H)" for k in range(1, 5)] + ["acc.z(f)", "pm.vbatMV(H)"]
+    data = (
+        struct.pack("<BHH", 0xBC, version, 1)
+        + struct.pack("<H", 7)
+        + b"fixedFrequency\0"
+        + struct.pack("<H", len(names))
+    )
+    data += b"".join(n.encode() + b"\0" for n in names)
+    for k in range(rows):
+        data += struct.pack("<HQ" if version == 2 else "<HI", 7, 1000 * k)
+        data += struct.pack("<HHHHfH", 20000, 20000, 20000, 20000, 1.0, 3700)
+    return data + struct.pack("<I", zlib.crc32(data))
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_a_flight_log_is_read_whole_or_refused(tmp_path: Path, version: int) -> None:
+    path = tmp_path / "flight.usdlog"
+    path.write_bytes(flight(version=version))
+    got = import_file(path)
+    assert got.provenance["format"] == "crazyflie_log" and len(got) == 20
+    assert got["time_s"][-1] == pytest.approx(0.019)
+    assert got["acceleration_z_m_s2"][0] == pytest.approx(G0)
+    assert got["voltage_V"][0] == pytest.approx(3.7)
+    damaged = bytearray(path.read_bytes())
+    damaged[-20] ^= 0xFF
+    path.write_bytes(bytes(damaged))
+    with pytest.raises(InputError, match="checksum"):
+        import_file(path)
+    path.write_bytes(flight()[:40])
+    with pytest.raises(InputError):
+        import_file(path)
 
 
 STANDS = {  # a table of each stand whose headings are known, {} the unit of a column

@@ -84,6 +84,10 @@ def reduce(recording: Dataset, *, diameter_m: float | None = None, steady: bool 
     if not set(LOADS) & rec.values.keys():
         got = "no thrust, torque, power, current or coefficient with a unit"
         hint = "Name units in the headings or in a recording.toml" + in_one_step(recording)
+        if recording.kind == "flight":
+            hint = (
+                "Nothing on board weighs the thrust: give a table with thrust_N, mass times acceleration per propeller"
+            )
         raise InputError(Fault(name, "", got, "one of them", hint))
     samples, reason = not steady, f"rows are taken as {'points' if steady else 'samples'}"
     if steady is None:

@@ -1,9 +1,7 @@
-"""Crazyflie: binary logs of its micro-SD card (``.usdlog``).
+"""Crazyflie: binary logs of its micro-SD card (``.usdlog``); the records are read in the readers' room.
 
-Magic 0xBC, version, number of event types, their names and variables with a type letter, then records: id (u16), time
-(us; version 1: u32, version 2: u64), packed little-endian values; the last four bytes are a CRC32 of all before
-(Bitcraze, crazyflie-firmware, tools/usdlog/cfusdlog.py). Units of the firmware's log variables: acc g; gyro deg/s; pwm
-and motor 0 to 65535; vbatMV mV.
+Units of the firmware's log variables (Bitcraze, crazyflie-firmware): acc g; gyro deg/s; pwm and motor 0 to 65535;
+vbatMV mV.
 """
 
 from __future__ import annotations
@@ -12,29 +10,22 @@ import struct
 import zlib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import G0
+from bemt.data.readers import crazyflie
 from bemt.tools.flight.layout import layout_of, mixed
 from bemt.tools.flight.log import MOST, FlightLog, joined, thrust_axis
 
 KIND = "Crazyflie usdlog"
-MAGIC = 0xBC
-_TIMES = {1: struct.Struct("<HI"), 2: struct.Struct("<HQ")}
-_LETTERS = dict(zip("bBhHiIlLqQefd", "i1 u1 <i2 <u2 <i4 <u4 <i4 <u4 <i8 <u8 <f2 <f4 <f8".split(), strict=True))
 
 
 def sniff(head: bytes) -> bool:
     """Whether the first bytes are those of such a log."""
-    if len(head) < 5 or head[0] != MAGIC:
-        return False
-    version, events = struct.unpack_from("<HH", head, 1)
-    return version in _TIMES and 0 < events < 1000
+    return crazyflie.sniff_crazyflie_log(head)
 
 
 def read(path: Path) -> FlightLog:
@@ -43,7 +34,7 @@ def read(path: Path) -> FlightLog:
     whole = len(data) > 8 and zlib.crc32(data[:-4]) == struct.unpack("<I", data[-4:])[0]
     body, size = memoryview(data)[: -4 if whole else None], len(data)
     try:
-        tables, end = _tables(body)
+        tables, end = crazyflie.log_tables(body, partly=True)
     except (struct.error, KeyError, ValueError, IndexError, MemoryError) as error:
         got = f"a header that cannot be read ({error})"
         raise InputError(Fault(name, "header", got, "a whole header", "Copy the file again")) from error
@@ -54,51 +45,6 @@ def read(path: Path) -> FlightLog:
         where = f"records end at byte {end} of {size}" if end < size - 4 else "all records can be read"
         ends = f"wrong checksum; {where}"
     return from_columns(name, KIND, columns, ends)
-
-
-def _text(data: memoryview, at: int) -> tuple[str, int]:
-    text, end, _ = bytes(data[at : at + 256]).partition(b"\0")
-    if not end:
-        raise ValueError("a name without an end")
-    return text.decode("utf-8"), at + len(text) + 1
-
-
-def _tables(data: memoryview) -> tuple[dict[str, dict[str, NDArray[Any]]], int]:
-    """Event to variable to (N,) values in the units and type of the log, and the place of the first damaged record.
-
-    `data` is the file without its checksum; `time_s` is in seconds of the log's clock.
-    """
-    version, events = struct.unpack_from("<HH", data, 1)
-    at, known, stamp = 5, {}, _TIMES[version]
-    for _ in range(events):
-        (number,) = struct.unpack_from("<H", data, at)
-        name, at = _text(data, at + 2)
-        (count,) = struct.unpack_from("<H", data, at)
-        at += 2
-        names, form = [], ""
-        for _ in range(count):
-            variable, at = _text(data, at)
-            if variable[-2] not in _LETTERS:
-                raise ValueError(f"type {variable[-2]!r}")
-            names.append(variable[:-3])
-            form += variable[-2]
-        row = np.dtype([("", _LETTERS[c]) for c in "H" + stamp.format[-1] + form])
-        known[number] = (name, names, row, bytearray())
-    while at < len(data):
-        try:
-            _, _, row, rows = known[stamp.unpack_from(data, at)[0]]
-        except (struct.error, KeyError):
-            break
-        if at + row.itemsize > len(data):
-            break
-        rows += data[at : at + row.itemsize]
-        at += row.itemsize
-    out = {}
-    for name, names, row, rows in known.values():
-        table = np.frombuffer(rows, dtype=row)
-        time, *values = list(table.dtype.names or ())[1:]
-        out[name] = {"time_s": 1e-6 * table[time]} | {n: table[v] for n, v in zip(names, values, strict=True)}
-    return out, at
 
 
 _STATES = (("stateEstimate", 1.0), ("stateEstimateZ", 1e-3))  # the packed ones are in millimetres
