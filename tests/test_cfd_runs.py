@@ -378,7 +378,12 @@ def test_a_written_run_is_read_back() -> None:
     import tomllib
 
     made = RunToml.model_validate(document)
-    assert RunToml.model_validate(_tuples(tomllib.loads(toml_text(made)))) == made
+    assert (
+        RunToml.model_validate(
+            _tuples(tomllib.loads(toml_text(made.model_dump(exclude_unset=True, exclude_none=True), "A run")))
+        )
+        == made
+    )
 
 
 def _tuples(value: Any) -> Any:

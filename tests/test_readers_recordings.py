@@ -19,10 +19,11 @@ from bemt.base import units
 from bemt.base.errors import InputError
 from bemt.base.units import G0
 from bemt.data import readers as importers
-from bemt.data.readers import _large, generic_csv, rcbenchmark, stands
+from bemt.data.readers import _large, generic_csv, rcbenchmark
 from bemt.data.readers.headings import heading, surely_shaft_speed
 from bemt.data.readers.split import NO_VALUE
 from bemt.data.recordings.channels import named
+from bemt.data.recordings.check import check
 from bemt.data.recordings.load import import_file
 from bemt.data.recordings.reduce import reduce, reduction
 from bemt.physics.dataset import Dataset
@@ -311,12 +312,14 @@ def test_a_step_test_is_read_whole(write: Write) -> None:
 def test_the_two_speeds_are_kept_apart(write: Write) -> None:
     got = rcbenchmark.read(write(rc_text(optical=0.0)))
     assert "rpm" not in got.values
-    assert said(got, "optical_rpm is 0 in every row") and said(got, "mechanical_power_W is torque times electrical_rpm")
+    assert said(got, "optical_rpm is 0 in every row")
     assert np.all(got["optical_rpm"] == 0.0)
     got = rcbenchmark.read(write(rc_text(optical=1 / 7), "poles.csv"))
-    assert said(got, "electrical over optical speed: median 7") and said(got, "were 7 pole pairs left out?")
-    assert np.allclose(got["electrical_rpm"], 7 * got["optical_rpm"])
-    assert not said(rcbenchmark.read(write(rc_text(optical=1.0), "same.csv")), "left out")
+    assert np.allclose(got["electrical_rpm"], 7 * got["optical_rpm"]) and said(got, "derived from the motor's phases")
+    (ratio,) = [f for f in check(got) if f.id == "rpm_ratio"]
+    assert ratio.severity == "error" and "7 pole pairs" in ratio.correction
+    same = rcbenchmark.read(write(rc_text(optical=1.0), "same.csv"))
+    assert not said(same, "motor's phases") and "rpm_ratio" not in {f.id for f in check(same)}
 
 
 def test_rpm_zero_and_spikes_are_kept_and_flagged(write: Write) -> None:
@@ -379,7 +382,7 @@ def test_a_stopped_motor_whose_load_cell_is_off_is_not_under_thrust(write: Write
 def test_signs_and_backward_time_are_reported_not_repaired(write: Write) -> None:
     text = rc_text(torque=-1.0).replace("\n3.5,", "\n-0.2,")
     got = rcbenchmark.read(write(text))
-    assert said(got, "torque_Nm is mostly negative") and np.all(got["torque_Nm"] < 0)
+    assert ("sign_flipped", "torque_Nm") in {(f.id, f.channel) for f in check(got)} and np.all(got["torque_Nm"] < 0)
     assert got.flags[1] == ("time goes backwards",) and got["time_s"][1] == -0.2
 
 
@@ -400,7 +403,7 @@ def test_a_continuous_record_keeps_its_sparse_channels(write: Write) -> None:
 
 
 def test_tables_carry_their_stated_errors(write: Write) -> None:
-    got = stands.read_jmajew(write(table_text(), "grp01__motor1_prop-9x7_4s_duct_table2.csv"))
+    got = importers.read(write(table_text(), "grp01__motor1_prop-9x7_4s_duct_table2.csv"))
     assert len(got) == 9 and got.unit("thrust_err_N") == "N"
     assert np.allclose(got["thrust_err_N"], 0.5 * units.KGF * 1e-3)
     assert np.allclose(got["torque_Nm"], 5e-11 * units.KGF * got["rpm"] ** 2, rtol=1e-5)
@@ -411,15 +414,20 @@ def test_tables_carry_their_stated_errors(write: Write) -> None:
 def test_units_that_the_table_contradicts_are_doubted(write: Write) -> None:
     lines = table_text().split("\n")
     milli = [",".join([*c[:9], f"{float(c[9]) * 1000:g}", *c[10:]]) for c in (t.split(",") for t in lines[1:-1])]
-    got = stands.read_jmajew(write("\n".join([lines[0], *milli]) + "\n"))  # current in mA
-    assert said(got, "pin is 0.001 times v x a (the factor of kilo") and said(got, "in doubt")
+    found = check(importers.read(write("\n".join([lines[0], *milli]) + "\n")))  # current in mA
+    (slip,) = [f for f in found if f.id == "current_unit"]
+    assert slip.severity == "error" and "electrical power over voltage x current is 0.001, must be 1" in slip.evidence
+    assert slip.correction.startswith("current_A: mA taken for A: multiply by 0.001")
+    theff = [",".join([*c[:12], f"{float(c[12]) / 9.80665:g}"]) for c in (t.split(",") for t in lines[1:-1])]
+    found = check(importers.read(write("\n".join([lines[0], *theff]) + "\n", "b.csv")))  # efficacy in another unit
+    assert any(f.severity == "error" and "thrust over (efficacy x electrical power)" in f.evidence for f in found)
 
 
 def test_rpm_of_the_raw_record_is_traced_to_telemetry(write: Write) -> None:
-    got = stands.read_jmajew(write(raw_text()))
+    got = importers.read(write(raw_text()))
     assert got.provenance["form"] == "raw" and said(got, "over 7 pole pairs, not a separate sensor")
     assert got.unit("Strain_Gauge_Thrust") == "" and got.unit("ESCT_RPM") == ""
-    assert not said(stands.read_jmajew(write(raw_text().replace(",600,", ",500,"), "b.csv")), "telemetry of")
+    assert not said(importers.read(write(raw_text().replace(",600,", ",500,"), "b.csv")), "telemetry of")
 
 
 # ---------------------------------------------------------------- any table

@@ -59,10 +59,10 @@ def test_sizes_from_names(stem: str, diameter: float, pitch: float | None, blade
     assert file.propeller.blades == blades
 
 
-def test_rpm_run_rotation_and_specimen_from_names() -> None:
+def test_rpm_and_rotation_from_names_with_a_run_and_a_specimen() -> None:
     line = parse_file_name("gwsdd_2.5x0.8_spec3_0475rd_15023")
-    assert line is not None and (line.role, line.run, line.rpm) == ("line", "0475rd", 15023.0)
-    assert line.propeller.name == "gwsdd_2.5x0.8_spec3" and line.propeller.specimen == 3
+    assert line is not None and (line.role, line.rpm) == ("line", 15023.0)
+    assert line.propeller.name == "gwsdd_2.5x0.8_spec3"
     pusher, tractor = parse_file_name("cfnq_45p1_geom"), parse_file_name("cfnq_45t1_geom")
     assert pusher is not None and tractor is not None
     assert (pusher.propeller.rotation, tractor.propeller.rotation) == (-1, 1)
@@ -90,9 +90,10 @@ def test_groups_geometry_static_and_lines(tmp_path: Path) -> None:
         apce_10x5_pg0828_4014=LINE,
     )  # fmt: skip
     (prop,) = sound(tmp_path)
-    assert (prop.name, prop.family, prop.label, prop.blades) == ("apce_10x5", "apce", "APC Thin Electric", 2)
+    assert (prop.name, prop.family, prop.blades) == ("apce_10x5", "apce", 2)
     assert prop.geometry is not None and prop.geometry.origin == "own" and prop.geometry.beta_deg[2] == 15.0
-    assert prop.static is not None and prop.static.rpm.tolist() == [2000.0, 4000.0] and prop.static.run == "pg0827"
+    static = prop.static
+    assert static is not None and static.rpm.tolist() == [2000.0, 4000.0]
     assert [line.rpm for line in prop.lines] == [4014.0, 6014.0]
     assert prop.lines[0].rows == (2, 3, 4) and Path(prop.lines[0].file).name == "apce_10x5_pg0828_4014.txt"
     assert prop.diameter_m == pytest.approx(0.254)
@@ -197,7 +198,6 @@ def test_line_needs_its_rpm(tmp_path: Path) -> None:
     path.write_text(LINE)
     with pytest.raises(InputError, match="no rpm in the file name"):
         uiuc.read_line(path)
-    assert uiuc.read_line(path, rpm=5000.0).rpm == 5000.0
 
 
 def test_line_endings_marks_comments_and_missing_eta(tmp_path: Path) -> None:

@@ -57,7 +57,7 @@ def read(path: Path, format: str | None = None) -> Dataset:  # noqa: A002
 @action("Recordings", "fetch uiuc", words=("kind",))
 def fetch(
     kind: Literal["uiuc"], *, source: Path | None = None, out: Path | None = None, url: str | None = None,
-    refresh: bool = False, progress: Callable[[str], None] | None = None,
+    progress: Callable[[str], None] | None = None,
 ) -> Told:  # fmt: skip
     """Download a public database of measured propellers into the cache.
 
@@ -68,11 +68,9 @@ def fetch(
     source : path, optional
         Use this archive (.zip) instead of downloading it.
     out : path, optional
-        Folder for the data; the cache by default.
+        Folder for the data; the cache by default. To have them anew, delete it.
     url : str, optional
         Download from this mirror instead of the publisher.
-    refresh : bool
-        Download again even if the data are there.
     progress : callable, optional
         Called with a line of text.
 
@@ -102,5 +100,5 @@ def fetch(
             progress(f"{have / 1e6:.1f}{f' of {total / 1e6:.1f}' if total else ''} MB")
 
     where, archive = (None if path is None else os.fspath(path) for path in (out, source))
-    found = database.get(kind, database.folder_of(kind, where), archive, url, refresh, bytes_had)
+    found = database.get(kind, database.folder_of(kind, where), archive, url, bytes_had)
     return Told(found.document(), found.text)

@@ -343,6 +343,14 @@ def detect(path: str | os.PathLike[str]) -> str:
     return kinds[0]
 
 
+def kind_of(path: str | os.PathLike[str]) -> str:
+    """Detect the format of a file; "" where `detect` refuses it, which is said where the file is read."""
+    try:
+        return detect(path)
+    except InputError:
+        return ""
+
+
 def _refuse_known(target: Path, head: bytes, place: Collector, a_table: bool) -> None:
     """Refuse a file that only the reader of tables claims where it is something else, and any that none claims."""
     for command, where in plugins.offered("FILE_KINDS").items() if not a_table else ():

@@ -207,9 +207,8 @@ def read_pe0(path: str | os.PathLike[str]) -> ApcBlade:
     inch = units.INCH
     version = re.search(r"^\s*(v\d{4}\S*)", source.text, re.MULTILINE)
     notes = tuple(re.findall(r"^\s*NOTE:\s*(.*?)\s*$", source.text, re.MULTILINE))
-    remark = (
-        f"{number_of(len(names), 'column')}; blade number by the name {blades_named}" if blades_named != blades else ""
-    )
+    other = f"{number_of(len(names), 'column')}; blade number by the name {blades_named}"
+    remark = other if blades_named != blades else ""
     return ApcBlade(
         name=name, version=version[1] if version else "", diameter_m=diameter_in * inch, pitch_m=pitch_in * inch,
         radius_m=R * inch, blades=int(blades), r_m=r * inch, chord_m=chord * inch, beta_rad=np.radians(twist_deg),

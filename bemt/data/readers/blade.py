@@ -305,9 +305,8 @@ def read_qprop(path: str | os.PathLike[str]) -> BladeFile:
     if R * (1 + 1e-9) < r[-1]:
         rows.add(line, f"R = {R:g}", f"at least the last radius, {last}", "R is in metres, whatever Rfac is")
     name, beta = rows.rows[0][1].strip(), np.radians(b)
-    return rows.finish(
-        BladeFile(name, "QPROP", as_count(blades), R, float(r[0]), r, c, beta, sections, notes=tuple(notes))
-    )
+    blade = BladeFile(name, "QPROP", as_count(blades), R, float(r[0]), r, c, beta, sections, notes=tuple(notes))
+    return rows.finish(blade)
 
 
 # DFDC: case files with a bladed rotor in a duct (the centre body gives the hub).

@@ -7,9 +7,9 @@ returns the checked document; `bemt.data.recordings.cfd_run` makes the points of
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from bemt.base.toml import Table, entry, read_model
 from bemt.data.readers import head_text
@@ -152,19 +152,17 @@ def read(path: str | os.PathLike[str]) -> RunToml:
     return read_model(RunToml, Path(path))
 
 
-def toml_text(run: RunToml, comment: str = "") -> str:
-    """Write a run as TOML.
+def toml_text(tables: Mapping[str, Any], comment: str) -> str:
+    """Write the tables of a run, or of a recording, as TOML; a column stands on one line.
 
-    >>> print(toml_text(RunToml(run=RunHead(files=("t.out",), rpm=6000.0))).strip())
-    [run]
-    files = ["t.out"]
-    rpm = 6000.0
+    >>> print(toml_text({"columns": {"rpm": {"column": "n", "unit": "rpm"}}, "setup": {}}, "One run").strip())
+    # One run
+    [columns]
+    rpm = {column = "n", unit = "rpm"}
     """
     import tomlkit
 
-    head = "".join(f"# {line}\n" for line in comment.splitlines()) + ("\n" if comment else "")
-    tables = run.model_dump(exclude_unset=True, exclude_none=True)
-    for name, column in tables.get("columns", {}).items():
-        tables["columns"][name] = tomlkit.inline_table()
-        tables["columns"][name].update(column)
-    return head + tomlkit.dumps({name: table for name, table in tables.items() if table})
+    inline = {name: tomlkit.inline_table() for name in tables.get("columns", {})}
+    for name, column in inline.items():
+        column.update(tables["columns"][name])
+    return f"# {comment}\n" + tomlkit.dumps({k: inline if k == "columns" else v for k, v in tables.items() if v})

@@ -19,17 +19,18 @@ from __future__ import annotations
 import os
 import re
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from decimal import Decimal
 from typing import NamedTuple
 
 import numpy as np
 
-from bemt.base.averaging import Mean, keep_last
+from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of
 from bemt.data.readers import Reader, SourceText, load_text, number
 from bemt.data.readers.cfd import Column, head_lines, made_of, si_unit, slug
+from bemt.data.readers.marks import EXPORT
 from bemt.data.readers.samples import Channel, dataset
 from bemt.physics.dataset import Dataset
 
@@ -199,25 +200,19 @@ def read_fluent_forces(path: str | os.PathLike[str]) -> Dataset:
     return dataset(FLUENT_FORCES, "cfd", channels, notes, about)
 
 
-# Fluent transcripts (``*.trn``) and copied console text: residuals, flow time, computed reports, force reports.
+# Fluent transcripts (``*.trn``) and copied console text: computed reports, force reports.
 #
 # ::
 #
-#       iter  continuity  x-velocity           k     time/iter
-#      11795  1.8226e-04  1.1633e-05  1.1935e-04  0:01:28   15
-#     Flow time = 4.417132770176977s, time step = 2371
 #                               Moment               [N m]
 #     -------------------------------- -------------------
 #                             tornillo         -0.18741116
 #
 # A transcript tells what somebody computed at some moment: each such number is a channel by quantity and zone, the last
-# computation standing for it. Its channels differ in length (residuals by iterations, flow time by steps).
+# computation standing for it. Residuals and flow times between them say nothing of a load.
 
 FLUENT_TRANSCRIPT = "fluent_transcript"
 
-_FLOW = re.compile(r"\s*Flow time = (\S+?)s?, time step = (\d+)\s*")
-_ITER = re.compile(r"\s*iter\s+(\S.*)")
-_ROW = re.compile(r"\s*\d+\s+\S.*\s\d+:\d\d:\d\d\s+\d+\s*")
 _RULE = re.compile(r"\s*-{8,}\s+-{8,}\s*")
 _HEAD = re.compile(r"\s*(\S.*?)\s+[\[(]([^\[\]()]*)[\])]\s*")
 _MARKS = re.compile(r"Auto-Transcript|Welcome to ANSYS Fluent|ANSYS FLUENT|ansys fluent|iter\s+continuity\b")
@@ -277,50 +272,9 @@ def _computed(source: SourceText, notes: list[str]) -> Iterator[tuple[str, str, 
             yield f"{name}({cells[0].strip()})", si or head[2].strip(), value
 
 
-def _residuals(source: SourceText) -> tuple[dict[str, list[float]], list[float], int]:
-    """Columns of the residual tables, their iterations, and the number of damaged rows."""
-    names: list[str] = []
-    known: dict[str, None] = {}
-    rows: list[dict[str, float]] = []
-    steps: list[float] = []
-    damaged = 0
-    for text in source.lines:
-        match = _ITER.fullmatch(text)
-        if match and "time/iter" in match[1]:
-            names = match[1].split()[:-1]
-            known |= dict.fromkeys(names)
-        elif names and _ROW.fullmatch(text):
-            step, *values = (number(cell) for cell in text.split()[:-2])
-            if len(values) != len(names) or step is None:
-                damaged += 1
-                continue
-            steps.append(step)
-            rows.append({n: v for n, v in zip(names, values, strict=True) if v is not None})
-    return {name: [row.get(name, float("nan")) for row in rows] for name in known}, steps, damaged
-
-
-def _history(columns: Mapping[str, list[float]], steps: list[float]) -> dict[str, Channel]:
-    keep, _ = keep_last(steps, "iteration")
-    channels = {"Iteration": Channel(np.array(steps)[keep])}
-    for name, column in columns.items():
-        values = np.array(column)[keep]
-        last = Mean(float(values[-1]), "last iteration") if np.isfinite(values[-1]) else None
-        channels[name] = Channel(values, "", last)
-    return channels
-
-
 def read_fluent_transcript(path: str | os.PathLike[str]) -> Dataset:
     """Read a transcript."""
-    source = load_text(path)
-    columns, steps, damaged = _residuals(source)
-    channels = _history(columns, steps) if steps else {}
-    notes = [f"{damaged} damaged rows of residuals left out"] if damaged else []
-    flow = [(number(m[1]), float(m[2])) for line in source.lines if (m := _FLOW.fullmatch(line))]
-    if times := [(t, s) for t, s in flow if t is not None]:
-        keep, dropped = keep_last([t for t, _ in times], "time_s")
-        notes += dropped
-        time, step = np.array(times)[keep].T
-        channels |= {"time_s": Channel(time, "s"), "Time Step": Channel(step)}
+    source, channels, notes = load_text(path), dict[str, Channel](), list[str]()
     found: dict[tuple[str, str], list[float]] = defaultdict(list)
     for name, unit, value in _computed(source, notes):
         found[name, unit].append(value)
@@ -334,7 +288,7 @@ def read_fluent_transcript(path: str | os.PathLike[str]) -> Dataset:
         if max(values) != min(values):
             notes.append(f"{name}: computed {len(values)} times with different values; the last one holds")
     if not channels:
-        source.refuse("", "no residuals, flow times or computed values", "a Fluent transcript")
+        source.refuse("", "no computed values", "a Fluent transcript with a report of forces or moments", EXPORT)
     told = {key: m[1].strip() for key, mark in _ABOUT.items() if (m := mark.search(source.text))}
     return dataset(FLUENT_TRANSCRIPT, "cfd", channels, [*notes, *_remarks(source)],
                    {**source.about, "clock": "none", **told})  # fmt: skip

@@ -31,6 +31,18 @@ Flow360 (``total_forces_v2.csv``) has coefficients by physical and pseudo step: 
 transient one the last pseudo step of each physical step holds. They rest on reference values of the case::
 
     physical_step, pseudo_step, CL, CD, CFx, CFy, CFz, CMx, CMy, CMz, CLPressure, ...
+
+OpenFOAM (``postProcessing``) names columns in a comment, below a title and settings: forces and moments, coefficients,
+propellerInfo, other named columns. The old layout has no totals, which are added over pressure, viscous and porous.
+Forces are in newtons if ``rhoInf`` was the density (incompressible solvers multiply by what the user gave). ``Time``
+counts iterations in a steady run; whole-number times are taken for that, with a warning::
+
+    # Force
+    # CofR          : (0 0 0)
+    # Time          total_x total_y total_z  pressure_x pressure_y pressure_z  viscous_x viscous_y viscous_z
+
+    # Time       forces(pressure viscous porous) moments(pressure viscous porous)
+    10  ((-222 119 0) (2.1 -1.4 0) (0 0 0)) ((0 0 -263) (0 0 0.4) (0 0 0))
 """
 
 from __future__ import annotations
@@ -38,13 +50,18 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bemt.data.readers import load_text
+from bemt.base.arrays import Array
+from bemt.base.tables import number_of
+from bemt.data.readers import SourceText, load_text
 from bemt.data.readers.cfd import Column, ExportRow, ExportTable, cells_of, head_lines, history, numeric_table, si_unit
 from bemt.physics.dataset import Dataset
+
+Cells = Callable[[str], tuple[str, ...]]
+Read = tuple[list[Column], ExportTable]
 
 
 @dataclass(frozen=True)
@@ -56,10 +73,13 @@ class Layout:
     header: Callable[[str], Sequence[str] | None]  # names on a line of headings; None on any other line
     mark: str | None = None  # between the cells of a row; None: blanks, and a decimal comma is possible
     brackets: str = "["  # of the unit in a heading; "": none has one
-    skip: str = "(?!)"  # lines that are neither headings nor rows
+    skip: str = "(?!)"  # lines that are neither headings nor rows; the first is a title
     notes: tuple[str, ...] = ()
     hint: str = "Is the header damaged?"  # where a row comes before the headings
-    finish: Callable[[list[Column], ExportTable, list[str]], tuple[list[Column], ExportTable]] | None = None
+    finish: Callable[[list[Column], ExportTable, list[str], dict[str, str]], Read] | None = None
+    setting: str = "(?!)"  # lines to skip that state something: its name, its value
+    columns: Callable[[SourceText, Sequence[str], dict[str, str]], list[Column]] | None = None  # not each by its words
+    cells: Callable[[Sequence[str]], Cells] | None = None  # of rows under these headings, where no mark parts them
     within: int = 1  # first lines that may be the header, for the sniffer
     told: Callable[[list[str]], bool] | None = None  # by its first lines, where a header alone does not tell
 
@@ -72,7 +92,8 @@ class Layout:
         """Read a history: headings that may be repeated by a restart, rows, lines to skip; all faults at once."""
         source = load_text(path)
         names: list[str] = []
-        title, rows, repeated, early = "", list[ExportRow](), list[int](), False
+        about, rows, repeated, early = {"title": ""}, list[ExportRow](), list[int](), False
+        cells: Cells = lambda text: cells_of(text, self.mark)  # noqa: E731
         for line, raw in enumerate(source.lines, 1):
             text = raw.strip()
             found = self.header(text) if text else None
@@ -83,10 +104,14 @@ class Layout:
                     break
                 repeated += [line] if names else []
                 names = names or list(found)
+                cells = self.cells(names) if self.cells else cells
             elif not text or re.match(self.skip, text):
-                title = title or text.strip('"# ')
+                if setting := re.fullmatch(self.setting, text):
+                    about[setting[1]] = setting[2].strip()
+                else:
+                    about["title"] = about["title"] or text.strip('"# \t')
             elif names:
-                rows.append(ExportRow(line, cells_of(text, self.mark)))
+                rows.append(ExportRow(line, cells(text)))
             elif not early:
                 early = True
                 source.add(line, repr(text[:60]), f"a header such as {self.example}", self.hint)
@@ -96,14 +121,15 @@ class Layout:
             source.add("", f"a header ({', '.join(names)}) and no rows", "one row or more", "Did the run write a step?")
         if not rows:
             source.check()
-        columns = [column_of(name, self.brackets) for name in names]
-        table = numeric_table(source, columns, rows, commas=self.mark is None)
+        own = self.columns(source, names, about) if self.columns else None
+        columns = own or [column_of(name, self.brackets) for name in names]
+        table = numeric_table(source, columns, rows, commas=self.mark is None and self.cells is None)
         source.check()
         again = f"header repeated in line {', '.join(map(str, repeated[:5]))}: the run was restarted"
         notes = [*([again] if repeated else []), *self.notes]
         if self.finish is not None:
-            columns, table = self.finish(columns, table, notes)
-        return history(self.KIND, source, columns, table, notes, {"title": title})
+            columns, table = self.finish(columns, table, notes, about)
+        return history(self.KIND, source, columns, table, notes, about)
 
 
 # ---------------------------------------------------------------- Fluent
@@ -160,7 +186,7 @@ def _monitor(lines: list[str]) -> bool:
     )
 
 
-def _checked(columns: list[Column], table: ExportTable, notes: list[str]) -> tuple[list[Column], ExportTable]:
+def _checked(columns: list[Column], table: ExportTable, notes: list[str], _: dict[str, str]) -> Read:
     if any(c.role == "value" and not c.unit for c in columns):
         notes.append("report files state no units, reference values, sector or sign convention: check them")
     if not any(c.role in ("step", "time") for c in columns):
@@ -190,7 +216,7 @@ def _star_names(line: str) -> tuple[str, ...] | None:
     return _commas(line) if own and any(column_of(cell, "(").role != "value" for cell in _commas(line)) else None
 
 
-def outermost(columns: list[Column], table: ExportTable, notes: list[str]) -> tuple[list[Column], ExportTable]:
+def _outermost(columns: list[Column], table: ExportTable, notes: list[str], _: dict[str, str]) -> Read:
     """Let the outermost counter that counts be the step; rows of inner iterations of one time step repeat it."""
     counters = [k for k, c in enumerate(columns) if c.role == "counter"]
     counting = [k for k in counters if len(np.unique(table.values[:, k])) > 1]
@@ -200,6 +226,117 @@ def outermost(columns: list[Column], table: ExportTable, notes: list[str]) -> tu
     for k in counters:
         columns[k] = Column(columns[k].name, "", "step" if k in steps else "counter")
     return columns, table
+
+
+# ---------------------------------------------------------------- OpenFOAM
+
+_TIME = re.compile(r"#\s*Time\b(?!\s+patch\b)(.*)")
+_NESTED = re.compile(r"(\w+)\(([^()]*)\)")
+_LOAD = re.compile(r"(local)?(forces?|moments?)", re.IGNORECASE)
+_VECTOR = re.compile(r"\(\s*((?:\w+_[xyz]\s*){3})\)")
+_PROPELLER: dict[str, tuple[str, str, float]] = {
+    "n": ("rpm", "rpm", 60.0), "URef": ("airspeed_m_s", "m_s", 1.0), "J": ("J", "-", 1.0), "KT": ("CT", "-", 1.0),
+    "10*KQ": ("CQ", "-", 0.1), "eta0": ("eta", "-", 1.0),
+}  # fmt: skip
+"""Columns of ``propellerInfo``: channel, unit, factor."""
+_PART = re.compile(r"(\w+)_(\w+)_([xyz])_(Nm?)")
+
+
+def _foam_header(line: str) -> list[str] | None:
+    """Time, and the columns or groups of columns that a comment names; None for any other line.
+
+    >>> _foam_header("# Time total_x total_y"), _foam_header("# Time"), _foam_header("# Time forces(pressure viscous)")
+    (['Time', 'total_x', 'total_y'], None, ['Time', 'forces(pressure viscous)'])
+    """
+    time = _TIME.fullmatch(line)
+    header = " ".join(time[1].split()) if time else ""
+    groups = _NESTED.findall(header)
+    if groups and all(_LOAD.fullmatch(name) for name, _ in groups):
+        return ["Time", *(f"{name}({parts})" for name, parts in groups)]
+    return ["Time", *_VECTOR.sub(r"\1", header).split()] if header else None
+
+
+def _foam_groups(names: Sequence[str]) -> list[tuple[str, list[str]]]:
+    """Load and its parts of each group of vectors; [] for columns that stand alone."""
+    found = [_NESTED.fullmatch(name) for name in names[1:]]
+    return [
+        (m[1].lower().removesuffix("s"), re.split(r"[,\s]+", m[2].strip()))
+        for m in found
+        if m and _LOAD.fullmatch(m[1])
+    ]
+
+
+def _foam_columns(source: SourceText, names: Sequence[str], about: dict[str, str]) -> list[Column]:
+    """Columns of a header: parts of a load along the axes, with their unit."""
+    if "bins" in about or any(re.search(r"\[\d+\]\(|_\d+_[xyz]\b", name) for name in names):
+        hint = "Their sum is in the forces (or force and moment) file in the same folder"
+        source.refuse("", "forces in bins along a direction", "forces of the whole", hint)
+    loads = [f"{name}_{part}_{axis}" for name, parts in _foam_groups(names) for part in parts for axis in "xyz"]
+    kind = about["title"].strip().lower().removesuffix("s")
+    if not loads and kind in ("force", "moment") and all(re.fullmatch(r"\w+_[xyz]", name) for name in names[1:]):
+        loads = [f"{kind}_{name}" for name in names[1:]]
+    units = ["Nm" if name.partition("_")[0].endswith("moment") else "N" for name in loads]
+    own = [Column(f"{name}_{unit}", unit) for name, unit in zip(loads, units, strict=True)]
+    return [Column("Time", "", "time"), *(own or map(Column, names[1:]))]
+
+
+def _foam_cells(names: Sequence[str]) -> Cells:
+    """Cells of a row; one with other parentheses than its header has is damaged, so that it is not shifted."""
+    groups = _foam_groups(names)
+    shape = "n" + "".join(f"({'(nnn)' * len(parts)})" for _, parts in groups) if groups else ""
+    width = shape.count("n") if shape else len(names)
+
+    def cells(text: str) -> tuple[str, ...]:
+        parts = re.findall(r"[()]|[^()\s]+", text)
+        found = tuple(p for p in parts if p not in "()")
+        own = "".join(p if p in "()" else "n" for p in parts)
+        right = own == shape if shape else own.replace("(nnn)", "nnn") == "n" * len(found)
+        return found if right or len(found) != width else (*found[:-1], "damaged parentheses")
+
+    return cells
+
+
+def _foam(columns: list[Column], table: ExportTable, notes: list[str], about: dict[str, str]) -> Read:
+    """Clock, units and totals, as far as the columns are loads; coefficients of propellerInfo in the usual names."""
+    if {"KT", "10*KQ"} <= {c.name for c in columns}:
+        own = [_PROPELLER.get(c.name, (c.name, c.unit, 1.0)) for c in columns]
+        table = replace(table, values=table.values * np.array([factor for _, _, factor in own]))
+        columns = [replace(c, name=name, unit=unit) for c, (name, unit, _) in zip(columns, own, strict=True)]
+    times = table.values[:, 0]
+    known = times[np.isfinite(times)]
+    if known.size and np.all(known == np.round(known)):
+        columns = [replace(columns[0], role="step"), *columns[1:]]
+        notes.append("whole-number times are taken for iterations of a steady run")
+    else:
+        columns = [Column("time_s", "s", "time"), *columns[1:]]
+    if any(c.unit in ("N", "Nm") for c in columns):
+        notes.append("newtons only if rhoInf was the density; if not: --reference density=RHOINF --density-kg-m3 RHO")
+        notes.append("of the patches of the function object: of one of N sectors, --sector N")
+        columns, table = _totals(columns, table, notes)
+    elif "magUInf" in about or any(c.name in ("Cd", "Cl", "CmPitch") for c in columns):
+        settings = ", ".join(f"{k} {about[k]}" for k in ("magUInf", "lRef", "Aref") if k in about)
+        told = f": {settings}" if settings else " that the file does not state"
+        notes.append(f"coefficients rest on reference values{told}")
+    return columns, table
+
+
+def _totals(columns: list[Column], table: ExportTable, notes: list[str]) -> Read:
+    """Sums over pressure, viscous and porous: added in the old layout, compared with the totals of the new one."""
+    loads = [(m.groups(), table.values[:, k]) for k, c in enumerate(columns) if (m := _PART.fullmatch(c.name))]
+    more: dict[Column, Array] = {}
+    for base, axis, unit in dict.fromkeys((base, axis, unit) for (base, _, axis, unit), _ in loads):
+        own = {part: v for (of, part, along, _), v in loads if (of, along) == (base, axis)}
+        total, name = own.pop("total", None), f"{base}_total_{axis}_{unit}"
+        with np.errstate(over="ignore", invalid="ignore"):
+            whole = np.sum([*own.values()], axis=0) if own else np.nan
+            if total is None:
+                more[Column(name, unit)] = np.where(np.isfinite(whole), whole, np.nan)
+            elif {"pressure", "viscous"} <= own.keys():
+                size = np.abs(own["pressure"]) + np.abs(own["viscous"])
+                off = np.flatnonzero(np.abs(total - whole) > 1e-4 * size)
+                where = f"{number_of(off.size, 'row')} (first: line {table.lines[off[0]]})" if off.size else ""
+                notes += [f"{name} is not the sum of its parts in {where}"] if where else []
+    return [*columns, *more], replace(table, values=np.column_stack([table.values, *more.values()]))
 
 
 READERS = (
@@ -221,11 +358,15 @@ READERS = (
         "su2_history", '"Time_Iter","Inner_Iter","CD"',
         lambda line: _commas(re.sub(r"^VARIABLES\s*=\s*", "", line)) if _SU2.match(line) else None, ",", "",
         r"(TITLE|ZONE)\b", ("coefficients rest on reference values that the history does not state",),
-        finish=outermost, within=4,
+        finish=_outermost, within=4,
     ),
     Layout(
         "flow360_forces", "physical_step, pseudo_step, CL, CD",
         lambda line: _commas(line) if _commas(line)[:2] == ("physical_step", "pseudo_step") else None, ",", "",
-        notes=("coefficients rest on reference values that the file does not state",), finish=outermost,
+        notes=("coefficients rest on reference values that the file does not state",), finish=_outermost,
+    ),
+    Layout(
+        "openfoam_forces", "# Time total_x total_y total_z", _foam_header, skip="#", setting=r"#\s*(\w+)\s*:\s*(.+)",
+        within=40, columns=_foam_columns, cells=_foam_cells, finish=_foam,
     ),
 )  # fmt: skip

@@ -12,13 +12,11 @@ Comma-separated, one heading line that names the units::
 * The Flight Stand software writes ``Powertrain 1 - rotation speed (rpm)``: one speed, whose sensor it does not name.
 * Two motors on one stand are ``Thrust A``, ``Thrust B``, or powertrains 1 and 2. If only one of them turned, its
   columns get the plain names; two that turned keep their letters, and the user says which one a recording is about.
-* ``Mechanical Power`` is torque times one of the speeds; which one is found from the numbers and reported.
 * Rows with 0 rpm, spikes, and times that go backwards are kept and flagged.
 """
 
 from __future__ import annotations
 
-import math
 import os
 import re
 from collections.abc import Sequence
@@ -26,13 +24,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from bemt.base import units
 from bemt.base.arrays import Array
 from bemt.base.tables import number_of
 from bemt.data.readers import head_text, number
 from bemt.data.readers._large import NumberTable
 from bemt.data.readers.headings import heading
-from bemt.data.readers.recording import Builder, Remark
+from bemt.data.readers.recording import Builder
 from bemt.data.readers.samples import MISREAD, MOST_RPM_PER_V, against_load, spikes
 from bemt.data.readers.split import SplitTable
 from bemt.physics.dataset import Dataset
@@ -82,14 +79,9 @@ def read(path: str | os.PathLike[str]) -> Dataset:
     said = {"stand": "RCbenchmark / Tyto", "mode": _mode(build)}
     build.flag_time()
     _speeds(build)
-    _power(build)
     if said["mode"] == "continuous":
         build.flag_spikes("thrust_N", "torque_Nm", "current_A", "voltage_V")
     build.check_magnitudes()
-    for name in ("thrust_N", "torque_Nm"):
-        v = build.at(name)
-        if v is not None and np.any(np.isfinite(v)) and -np.nanmin(v) > 2.0 * max(np.nanmax(v), 0.0):
-            build.warnings.append(f"{name} is mostly negative: another sign convention? The sign was not changed")
     return build.finish(said)
 
 
@@ -160,13 +152,9 @@ def _speeds(build: Builder) -> None:
         build.flag(np.flatnonzero(wild), f"spike of {name}")
     electrical = next((n for n in build.channels if n.startswith("electrical_rpm")), None)
     electric, optical = (build.at(n) for n in _SPEEDS)
-    both = np.zeros(0)
-    if electric is not None and optical is not None:
-        good = (electric > 0) & (optical > 0)
-        both = electric[good] / optical[good]
-    ratio = float(np.median(both)) if both.size >= 3 else math.nan
-    text = f"electrical over optical speed: median {ratio:.4g} in {both.size} rows"
-    agree = abs(ratio - 1.0) < 0.05
+    agree = False
+    if electric is not None and optical is not None and np.count_nonzero(good := (electric > 0) & (optical > 0)) >= 3:
+        agree = abs(float(np.median(electric[good] / optical[good])) - 1.0) < 0.05
     if electrical and seen and not agree:
         build.warnings.append(
             f"{electrical} is derived from the motor's phases with the number of poles set in the stand's software, "
@@ -175,12 +163,6 @@ def _speeds(build: Builder) -> None:
     if "rpm" in build.channels and seen:
         note = "rpm: the file names neither its sensor nor the number of poles set in the stand's software"
         build.warnings.append(note)
-    if agree:
-        build.warnings.append(Remark(text))
-    elif both.size >= 3:
-        near = round(ratio) if ratio > 1 else 1
-        whole = near > 1 and abs(ratio / near - 1) < 0.05
-        build.warnings.append(text + (f"; were {near} pole pairs left out?" if whole else ""))
 
 
 def _no_current(build: Builder) -> np.ndarray:
@@ -199,19 +181,3 @@ def _wild(v: Array, load: Array | None) -> np.ndarray:
         if np.count_nonzero(good) >= 5:
             out[good] = against_load(v[good], load[good]) < 1.0 / MISREAD
     return out
-
-
-def _power(build: Builder) -> None:
-    """Tell which speed the mechanical power was computed with; the sanity checks look at its size."""
-    power, torque = build.at("mechanical_power_W"), build.at("torque_Nm")
-    same: list[str] = []
-    for name in (*_SPEEDS, "rpm"):
-        speed = build.at(name)
-        if power is None or torque is None or speed is None:
-            continue
-        product = np.abs(torque) * speed * units.RPM
-        good = (product > 0.05 * np.nanmax(np.append(product, 0.0))) & (power > 0)
-        if np.count_nonzero(good) >= 3 and math.isclose(np.median(power[good] / product[good]), 1.0, rel_tol=0.02):
-            same.append(name)
-    if same:
-        build.warnings.append(Remark(f"mechanical_power_W is torque times {' and '.join(same)}"))

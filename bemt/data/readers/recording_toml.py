@@ -306,10 +306,8 @@ def _places(file: str, table: SplitTable | NumberTable, columns: Mapping[str, Co
             index = hits[0] if len(hits) == 1 else None
         if index is None or index in places:
             known = some((repr(h) for h in table.headings if h), 12) or f"columns 1 to {width}"
-            got = (
-                f"{place!r} again" if index is not None else f"{place!r}, which {table.source.name} has not (or twice)"
-            )
-            faults.append(Fault(file, f"columns.{name}.column", got, f"one of {known}"))
+            got = " again" if index is not None else f", which {table.source.name} has not (or twice)"
+            faults.append(Fault(file, f"columns.{name}.column", f"{place!r}{got}", f"one of {known}"))
         else:
             places[index] = name
     refuse(faults)
@@ -357,12 +355,9 @@ def _derive(build: Builder, pairs: int) -> None:
         label = build.free("rpm") if "rpm" not in build.channels else "rpm_from_electrical_rpm"
         build.channels[label] = Channel(build.channels["electrical_rpm"].values / pairs, "rpm")
         less, more = (f"{100.0 * ((pairs + step) / pairs) ** 2 - 100.0:+.0f} %" for step in (-1, 1))
-        other = (
-            f"; were it {pairs - 1} or {pairs + 1}, CT would be {less} or {more}: count the magnets"
-            if pairs > 1
-            else ""
-        )
-        build.warnings.append(f"{label} is electrical_rpm over {pairs} pole pairs, as the recording says{other}")
+        other = f"; were it {pairs - 1} or {pairs + 1}, CT would be {less} or {more}: count the magnets"
+        told = f"{label} is electrical_rpm over {pairs} pole pairs, as the recording says"
+        build.warnings.append(told + (other if pairs > 1 else ""))
     build.flag_time()
     if "time_s" in build.channels:
         build.flag_spikes("thrust_N", "torque_Nm", "rpm", "electrical_rpm", "optical_rpm")

@@ -311,15 +311,12 @@ def _without_ends(
 ) -> list[tuple[int, list[str]]]:
     """Rows without headings that come again, sums of the rows above, and remarks at the end, all named in notes."""
     again = [i for i, cells in body if cells == list(names)]
-    sums = [
-        (i, next(filter(None, cells), "")) for i, cells in body if _SUMMARY.fullmatch(next(filter(None, cells), ""))
-    ]
+    sums = [(i, word) for i, cells in body if _SUMMARY.fullmatch(word := next(filter(None, cells), ""))]
     out = {*again, *(i for i, _ in sums)}
     kept = [(i, cells) for i, cells in body if i not in out]
     ends: list[tuple[int, list[str]]] = []
-    while (
-        len(kept) > 1 and not any(map(_reads, kept[-1][1])) and sum(map(bool, kept[-1][1])) <= max(1, len(names) // 3)
-    ):
+    few = max(1, len(names) // 3)
+    while len(kept) > 1 and not any(map(_reads, kept[-1][1])) and sum(map(bool, kept[-1][1])) <= few:
         ends.append(kept.pop())
     if again:
         notes.append(f"{number_of(len(again), 'line')} left out: the headings again (line {some(again)})")
@@ -343,9 +340,8 @@ def _used_lines(source: SourceText, lines: Sequence[str]) -> tuple[list[tuple[in
         source.refuse(longest[0], f"a line of {len(longest[1])} characters", f"a table of lines of at most {LONGEST}")
     comments, bare = sum(map(is_comment, lines)), [i for i, t in text if not t.strip(" \t;,|")]
     notes = [f"{comments} comment lines left out"] if comments else []
-    return used, notes + (
-        [f"{number_of(len(bare), 'line')} of empty cells left out (line {some(bare)})"] if bare else []
-    )
+    notes += [f"{number_of(len(bare), 'line')} of empty cells left out (line {some(bare)})"] if bare else []
+    return used, notes
 
 
 def split_table(

@@ -6,7 +6,7 @@ step and headings without units::
     out,th,th_err,tq,tq_err,rpm,rpm_err,v,v_err,a,a_err,pin,theff
 
 out [%], th [gf], tq [gf cm], rpm [1/min], v [V], a [A], pin [W], theff [gf/W]; ``_err`` is the stated error in the unit
-of its channel. That these units hold is checked within the file: pin = v a and theff = th/pin.
+of its channel. That these units hold shows in pin = v a and theff = th/pin, which the checks of any recording look at.
 
 Raw records have one row per sample and no time; their headings name units as ``Thrust [G]`` (gram-force), counts of the
 converters have none. ``RPM [1/min]`` is no sensor of its own: it is ``ESCT RPM`` (telemetry, hundreds of electrical
@@ -24,69 +24,44 @@ from pathlib import Path
 import numpy as np
 
 from bemt.base import units
-from bemt.data.readers import Reader, first_cells
-from bemt.data.readers.headings import Heading, heading, known, slug
-from bemt.data.readers.recording import Builder, slip
+from bemt.data.readers import first_cells
+from bemt.data.readers.headings import Heading, slug
+from bemt.data.readers.recording import Builder
 from bemt.data.readers.samples import Channel
 from bemt.physics.dataset import Dataset
 
-JMAJEW = "jmajew"
-_JMAJEW_COLUMNS = {
+_JMAJEW_TABLE = {
     "out": ("throttle", "pct"), "th": ("thrust", "gf"), "tq": ("torque", "gf_cm"), "rpm": ("", "rpm"),
     "v": ("voltage", "V"), "a": ("current", "A"), "pin": ("electrical_power", "W"), "theff": ("efficacy", "gf/W"),
 }  # fmt: skip
-_RAW = {
-    "Motor Output": ("pulse_width", "us"), "Motor Level": ("throttle", "pct"), "Thrust": ("thrust", "gf"),
-    "Torque": ("torque", "gf_cm"), "RPM": ("", "rpm"), "VoltBatt": ("voltage", "V"), "CurrBatt": ("current", "A"),
-    "Power In": ("electrical_power", "W"), "Power Out": ("mechanical_power", "W"),
-    "Efficiency": ("motor_efficiency", "pct"), "Thrust Efficiency": ("efficacy", "gf/W"),
+_JMAJEW_RAW = {  # in the raw record the same words without a unit head the counts
+    "Motor Level": ("throttle", "pct"), "Thrust": ("thrust", "gf"), "Torque": ("torque", "gf_cm"), "RPM": ("", "rpm"),
+    "VoltBatt": ("voltage", "V"), "CurrBatt": ("current", "A"), "Power In": ("electrical_power", "W"),
+    "Power Out": ("mechanical_power", "W"), "Efficiency": ("motor_efficiency", "pct"),
+    "Thrust Efficiency": ("efficacy", "gf/W"),
 }  # fmt: skip
-_RAW_KEYS = {"Motor Output", "ESCT RPM", "Thrust", "Torque"}
-
-
-def sniff_jmajew(head: bytes | str) -> bool:
-    r"""Tell whether the first line has this stand's headings.
-
-    >>> sniff_jmajew("out,th,th_err,tq,tq_err,rpm,rpm_err,v,v_err,a,a_err,pin,theff\n"), sniff_jmajew("th,tq,rpm\n")
-    (True, False)
-    """
-    cells = first_cells(head)
-    return {"out", "th", "th_err", "tq", "tq_err", "rpm"} <= cells or set(map(_base, cells)) >= _RAW_KEYS
-
-
-def read_jmajew(path: str | os.PathLike[str]) -> Dataset:
-    """Read a table or a raw record. ["form"]"""
-    build = Builder.of_stand(path, JMAJEW)
-    raw = set(map(_base, build.table.headings)) >= _RAW_KEYS
-    for k, text in enumerate(build.table.headings):
-        if raw and _base(text) in _RAW and (_base(text) != text or text == "Motor Output"):
-            build.add_usual(k, *_RAW[_base(text)])
-        else:
-            build.add(k, Heading(text, slug(text), None, "counts or telemetry") if raw else _table_heading(text))
-    if not build.faults:
-        build.need("thrust_N", "torque_Nm", "rpm")
-    form = "raw" if raw else "table"
-    said = {"stand": "thrust_tool (J. Majewski)", "form": form, **_name(Path(build.table.source.name).stem)}
-    if not build.faults:
-        with np.errstate(over="ignore", invalid="ignore"):  # damaged cells may hold any number
-            (_check_raw if raw else _check_table)(build)
-        build.flag(np.flatnonzero(build.channels["rpm"].values == 0.0), "rpm is 0")
-        if said.get("propeller") == "none":
-            build.warnings.append("recorded without a propeller: a tare of the stand, not performance data")
-        build.check_magnitudes()
-    return build.finish(said)
-
-
-def _table_heading(text: str) -> Heading:
-    base = text.removesuffix("_err")
-    if base not in _JMAJEW_COLUMNS:
-        return heading(text)
-    name, unit = _JMAJEW_COLUMNS[base]
-    return known(text, f"{name}_err".lstrip("_") if base != text and base != "theff" else name, unit)
+_JMAJEW = {
+    **_JMAJEW_TABLE, "Motor Output": ("pulse_width", "us"), **{f"{k} [": usual for k, usual in _JMAJEW_RAW.items()},
+    **{f"{k}_err": (f"{name}_err".lstrip("_"), unit) for k, (name, unit) in _JMAJEW_TABLE.items() if k != "theff"},
+}  # fmt: skip
 
 
 def _base(text: str) -> str:
     return text.partition("[")[0].strip()
+
+
+def _jmajew(build: Builder) -> Dataset:
+    raw = "ESCT RPM" in build.table.headings
+    said = {"stand": "thrust_tool (J. Majewski)", "form": "raw" if raw else "table",
+            **_name(Path(build.table.source.name).stem)}  # fmt: skip
+    with np.errstate(over="ignore", invalid="ignore"):  # damaged cells may hold any number
+        (_check_raw if raw else _check_table)(build)
+    build.flag(np.flatnonzero(build.channels["thrust_N"].values < 0.0), "thrust_N is negative")
+    build.flag(np.flatnonzero(build.channels["rpm"].values == 0.0), "rpm is 0")
+    if said.get("propeller") == "none":
+        build.warnings.append("recorded without a propeller: a tare of the stand, not performance data")
+    build.check_magnitudes()
+    return build.finish(said)
 
 
 def _name(stem: str) -> dict[str, str]:
@@ -105,41 +80,16 @@ def _name(stem: str) -> dict[str, str]:
 
 
 def _check_table(build: Builder) -> None:
-    """Units are not in the file: see that its own products agree with them."""
+    """Flag errors that no reading has, and a throttle that falls."""
     c = {name: channel.values for name, channel in build.channels.items()}
-    thrust = c["thrust_N"]
-    volts, amps, power, efficacy, throttle = (
-        c.get(name) for name in ("voltage_V", "current_A", "electrical_power_W", "efficacy_N_W", "throttle")
-    )
-    if volts is not None and amps is not None and power is not None:
-        _ratio(build, volts * amps, power, "pin", "v x a", 0.05)
-    if power is not None and efficacy is not None:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            _ratio(build, thrust / power, efficacy, "theff", "th/pin", 0.01)
-    for name in [n for n in c if "_err_" in n or n.endswith("err_rpm") or n == "err_rpm"]:
+    for name in [n for n in c if "_err_" in n or n.endswith("err_rpm")]:
         build.flag(np.flatnonzero(c[name] < 0.0), f"{name} is negative")
         main = name.replace("_err_", "_").replace("err_rpm", "rpm")
         if main in c:
-            usual = float(np.nanmedian(c[name]))
-            wide = np.flatnonzero(c[name] > 20.0 * max(usual, 1e-12))
+            wide = np.flatnonzero(c[name] > 20.0 * max(float(np.nanmedian(c[name])), 1e-12))
             build.flag(wide, f"stated error of {main} above 20 times its median")
-    build.flag(np.flatnonzero(thrust < 0.0), "thrust_N is negative")
-    if throttle is not None:
-        build.flag(np.flatnonzero(np.diff(throttle, prepend=-np.inf) <= 0.0), "throttle does not rise")
-
-
-def _ratio(build: Builder, expected: np.ndarray, got: np.ndarray, name: str, formula: str, tolerance: float) -> None:
-    top = float(np.nanmax(np.abs(np.append(expected, 0.0))))
-    good = np.isfinite(expected) & np.isfinite(got) & (np.abs(expected) > max(0.05 * top, 0.01))  # three decimals only
-    if not np.any(good):
-        return
-    ratio = got[good] / expected[good]
-    usual = float(np.median(ratio))
-    if abs(usual - 1.0) > tolerance:
-        text = f"{name} is {usual:.4g} times {formula}{slip(usual)}"
-        build.warnings.append(f"{text}: the units of this table are in doubt")
-    else:
-        build.flag(np.flatnonzero(good)[np.abs(ratio / usual - 1.0) > 5 * tolerance], f"{name} differs from {formula}")
+    if "throttle" in c:
+        build.flag(np.flatnonzero(np.diff(c["throttle"], prepend=-np.inf) <= 0.0), "throttle does not rise")
 
 
 def _check_raw(build: Builder) -> None:
@@ -158,7 +108,6 @@ def _check_raw(build: Builder) -> None:
                 build.warnings.append(text + whole + ", not a separate sensor")
     build.warnings.append("no time in a raw record: rows are in order of sampling")
     build.flag_spikes("thrust_N", "torque_Nm", "rpm")
-    build.flag(np.flatnonzero(c["thrust_N"] < 0.0), "thrust_N is negative")
 
 
 # Tables of the New Dexterity coaxial stand: two rotors, ``Left`` upstream and ``Right`` downstream, a row per setting.
@@ -270,9 +219,11 @@ class StandTable:
 
     KIND: str
     marks: tuple[set[str], ...]  # Headings without their units that tell it: all of one of these sets
-    columns: Mapping[str, tuple[str, str]]  # Heading without its unit: name of the channel, usual unit
+    # Heading without its unit, or up to the bracket of one that must have it: name of the channel, usual unit
+    columns: Mapping[str, tuple[str, str]]
     needs: tuple[str, ...]
     finish: Callable[[Builder], Dataset]
+    others: str = ""  # What columns of other headings are; "": left out
 
     def sniff(self, head: bytes | str) -> bool:
         """Tell whether the first line has this stand's headings."""
@@ -283,16 +234,23 @@ class StandTable:
         """Read a table."""
         build = Builder.of_stand(path, self.KIND)
         for k, text in enumerate(build.table.headings):
-            if usual := self.columns.get(_base(text)):
+            base = _base(text)
+            usual = self.columns.get(base) or (self.columns.get(f"{base} [") if base != text else None)
+            if usual is not None:
                 build.add_usual(k, *usual)
+            elif self.others:
+                build.add(k, Heading(text, slug(text) or "column", None, self.others))
         build.check()
         build.need(*self.needs)
         build.check()
         return self.finish(build)
 
 
-READERS: tuple[Reader | StandTable, ...] = (
-    Reader(JMAJEW, sniff_jmajew, read_jmajew),
+READERS = (
+    StandTable(
+        "jmajew", (set("out th th_err tq tq_err rpm".split()), {"Motor Output", "ESCT RPM", "Thrust", "Torque"}),
+        _JMAJEW, ("thrust_N", "torque_Nm", "rpm"), _jmajew, "counts or telemetry",
+    ),
     StandTable(
         "coaxial_stand", ({f"{what} {side}" for what in ("PWM", "Thrust", "Speed") for side in ("Left", "Right")},),
         {f"{what} {side.title()}": (f"{name}_{side}".lstrip("_"), unit)

@@ -138,15 +138,9 @@ def read_stations(path: Path, R: float) -> BladeStations:
     top = table.headings_line
     found = [column for j, text in enumerate(table.headings) if (column := column_of(j, text, R))]
     told = []
-    if not any(
-        column.name in ("beta", "pitch") for column in found
-    ):  # beside r and chord one angle is that of the blade
-        bare = [(j, h) for j, h in enumerate(table.headings) if _ANGLE.search(plain(h))]
-        angles = (
-            [c for j, h in bare if (c := column_of(j, _ANGLE.sub("blade angle", plain(h)), R))]
-            if len(bare) == 1
-            else []
-        )
+    bare = [(j, h) for j, h in enumerate(table.headings) if _ANGLE.search(plain(h))]
+    if len(bare) == 1 and not {"beta", "pitch"} & {column.name for column in found}:  # the one angle is the blade's
+        angles = [c for j, h in bare if (c := column_of(j, _ANGLE.sub("blade angle", plain(h)), R))]
         told = [f"column {bare[0][1]!r} read as beta_deg, the angle to the plane of rotation" for _ in angles]
         found += angles
     by_name = {name: [c for c in found if c.name == name] for name in _HEADS}
@@ -253,9 +247,9 @@ def _limits(source: SourceText, places: list[_Column], columns: tuple[Array, Arr
         (c.max(), 0.0, WIDEST),
         (np.abs(beta).max(), 0.0, 90.0),
     )
-    radius = (
-        _other_unit(places[0], x.max(), LEAST_REACH, 1.001, R) if is_length else "Divide the radius by the tip radius"
-    )
+    radius = "Divide the radius by the tip radius"
+    if is_length:
+        radius = _other_unit(places[0], x.max(), LEAST_REACH, 1.001, R)
     chord = "Divide the chord by the tip radius; one over the diameter is chord_over_D"
     if not places[1].share:
         chord = radius if is_length else _other_unit(places[1], c.max(), USUAL_WIDTH, WIDEST, R)

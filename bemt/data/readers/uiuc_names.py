@@ -126,7 +126,7 @@ _RUN = re.compile(r"[a-z]{0,3}\d{3,5}[a-z]{0,3}", re.IGNORECASE)
 _FILE = re.compile(r"[a-z][a-z0-9]*(?:-[a-z0-9]+)*", re.IGNORECASE)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class UiucName:
     """What the name of a propeller says."""
 
@@ -138,9 +138,7 @@ class UiucName:
     pitch_in: float | None = None
     angle_deg: float | None = None  # Nominal blade angle at r/R = 0.75, given or from the pitch [deg]
     blades: int = 2  # Number of blades
-    blades_from: str = "default"  # ``name``, ``family`` or ``default``
     rotation: int = 1  # +1 tractor, -1 pusher
-    specimen: int = 1  # Number of the specimen; 1 when the name has none
     faults: tuple[tuple[str, str, str], ...] = ()  # Why the name cannot be used; empty when it can
 
 
@@ -150,7 +148,6 @@ class UiucFile:
 
     role: str
     propeller: UiucName
-    run: str = ""
     rpm: float | None = None
 
 
@@ -164,11 +161,11 @@ def _size(token: str, family: str) -> dict[str, object]:
             diameter, pitch = diameter / 25.4, pitch / 25.4
         found: dict[str, object] = {"diameter_in": diameter, "pitch_in": pitch}
         if match[3]:
-            found |= {"blades": int(match[3]), "blades_from": "name"}
+            found["blades"] = int(match[3])
         return found
     if match := re.fullmatch(r"(\d+)([tp])(\d)", token):
         named = NAMED_DIAMETERS_IN.get(f"{family}_{match[1]}")
-        return {"diameter_in": named, "rotation": -1 if match[2] == "p" else 1, "specimen": int(match[3])}
+        return {"diameter_in": named, "rotation": -1 if match[2] == "p" else 1}
     if match := re.fullmatch(_N, token):
         value = float(token)
         return {"diameter_in": value / 25.4 if value > MM_ABOVE else value}
@@ -178,7 +175,7 @@ def _size(token: str, family: str) -> dict[str, object]:
 def _propeller(family: str, middle: list[str]) -> UiucName:
     """Read the propeller's part of a file name; ``middle`` is empty for the design of a family."""
     name, key = "_".join([family, *middle]), family.lower()
-    found: dict[str, object] = {"blades": 3, "blades_from": "family"} if key in THREE_BLADES else {}
+    found: dict[str, object] = {"blades": 3} if key in THREE_BLADES else {}
     if not middle:
         return UiucName(name, family)
     found |= _size(middle[0].lower(), key)
@@ -186,9 +183,7 @@ def _propeller(family: str, middle: list[str]) -> UiucName:
         if match := re.fullmatch(rf"{_N}deg", token):
             found["angle_deg"] = float(match[1])
         elif match := re.fullmatch(r"(\d)b(?:l|lades?)?", token):
-            found |= {"blades": int(match[1]), "blades_from": "name"}
-        elif match := re.fullmatch(r"spec(\d+)", token):
-            found["specimen"] = int(match[1])
+            found["blades"] = int(match[1])
     diameter, pitch, angle = found.get("diameter_in"), found.get("pitch_in"), found.get("angle_deg")
     faults: list[tuple[str, str, str]] = []
     if not isinstance(diameter, float):
@@ -231,9 +226,8 @@ def parse_file_name(stem: str) -> UiucFile | None:
         return UiucFile(last, _propeller(family, rest[:-1]))
     lower = [part.lower() for part in rest]
     if "static" in lower and lower.index("static") > 0:
-        at = lower.index("static")
-        return UiucFile("static", _propeller(family, rest[:at]), "_".join(rest[at + 1 :]))
+        return UiucFile("static", _propeller(family, rest[: lower.index("static")]))
     if len(rest) >= 2 and re.fullmatch(r"\d{3,6}(\.\d+)?", last):
-        run = rest[-2] if len(rest) >= 3 and _RUN.fullmatch(rest[-2]) else ""
-        return UiucFile("line", _propeller(family, rest[: -2 if run else -1]), run, float(last))
+        of_run = len(rest) >= 3 and _RUN.fullmatch(rest[-2])
+        return UiucFile("line", _propeller(family, rest[: -2 if of_run else -1]), float(last))
     return None

@@ -44,9 +44,7 @@ def reduction_of(record: Dataset) -> Dataset | str:
     try:
         return reduce(record)
     except InputError as error:
-        return "; ".join(
-            f"got {f.got}; expected {f.expected}" + (f". {f.hint}" if f.hint else "") for f in error.faults
-        )
+        return "; ".join(f"got {f.got}; expected {f.expected}{f'. {f.hint}' if f.hint else ''}" for f in error.faults)
 
 
 _KIND = {"apc": "vendor", "uiuc": "bench", "references": "table"}
@@ -143,9 +141,8 @@ def _along(found: Mapping[str, Slices], form: str, name: str) -> Dataset:
     """Loads along the blade, a run after the other, with their sums."""
     notes = [f"{run}: {np.trapezoid(s.thrust, s.r):.4g} N and {np.trapezoid(s.torque, s.r):.4g} N m between the radii "
              f"{s.r[0]:.4g} and {s.r[-1]:.4g} m" for run, s in found.items()]  # fmt: skip
-    notes.append(
-        f"taken for loads of all blades; `bemt diagnose RECORDING --case CASE --along {name}` sets them beside BEMT"
-    )
+    command = f"`bemt diagnose RECORDING --case CASE --along {name}`"
+    notes.append(f"taken for loads of all blades; {command} sets them beside BEMT")
     columns = {"r_m": "r", "thrust_per_radius_N_m": "thrust", "torque_per_radius_Nm_m": "torque"}
     channels = {k: Channel(np.concatenate([getattr(s, a) for s in found.values()]), k.split("_", 3)[-1] if a != "r"
                            else "m") for k, a in columns.items()}  # fmt: skip

@@ -1,9 +1,13 @@
-"""Files of a CFD run: found in folders, read, parts of a restarted history joined, the settled part averaged."""
+"""Files of a CFD run: found in folders, read, parts of a restarted history joined, the settled part averaged.
+
+Their columns: force or moment, axis, zone, and what a heading may be.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,6 +17,9 @@ from bemt.base.arrays import Array
 from bemt.base.averaging import MIN_ROWS, keep_last, relation, revolution_average, steady_average
 from bemt.base.errors import Fault, InputError
 from bemt.data import readers
+from bemt.data.readers.cfd import unit_of
+from bemt.data.readers.cfd_run import QUANTITIES
+from bemt.data.readers.headings import CELLS, channel_of, heading, may_be_shaft_speed, meanings
 from bemt.data.readers.split import some
 from bemt.data.recordings.channels import clocks_of
 from bemt.physics.dataset import Dataset
@@ -50,15 +57,7 @@ def cfd_files(folder: Path) -> tuple[Path, ...]:
         found = (post if post.is_dir() else folder).glob("*/*/*.dat")
     else:
         found = folder.glob("*/*.dat" if folder.parent.name == "postProcessing" else "*")
-    files = sorted(p for p in found if p.is_file())
-    out = []
-    for path in files:
-        try:
-            if readers.detect(path) in PROGRAMS:
-                out.append(path)
-        except InputError:
-            continue
-    return tuple(out)
+    return tuple(p for p in sorted(found) if p.is_file() and readers.kind_of(p) in PROGRAMS)
 
 
 def y_plus(files: Sequence[Path]) -> dict[str, float]:
@@ -177,10 +176,8 @@ def settled(
         index = index[time[index] <= end * (1.0 + 1e-9)]
         step = float(np.median(np.diff(time[index]))) if index.size > 1 else 0.0
         if step > period / MIN_ROWS:
-            clock, coarse = (
-                "iteration",
-                f"; {step:.3g} s a row, {period / step:.2g} rows a revolution: taken for iterations",
-            )
+            clock = "iteration"
+            coarse = f"; {step:.3g} s a row, {period / step:.2g} rows a revolution: taken for iterations"
     if clock == "time":
         found = revolution_average(time[index], values[index], period, revolutions)
         if found.mean is None:
@@ -205,3 +202,133 @@ def settled(
     if values.size > 1 and mean and record.format == "fluent_transcript":
         values, over = values[np.isfinite(values)][-1:], "the last one computed"
     return Settled(np.array(values, dtype=float), math.nan, 0.0, over)
+
+
+# Columns of the files, and what they may be by name and unit.
+
+_FORCE = re.compile(r"force_total(?:_([xyz]))?(?:_N)?( along .*)?|C(?:F)([xyz])")
+_MOMENT = re.compile(r"moment_total(?:_([xyz]))?(?:_Nm)?( along .*)?|C(?:M)([xyz])")
+_ASIDE = re.compile(
+    r"(force|moment)_(pressure|viscous|porous|internal)(_|\b)|center_of_pressure|(force|moment)_coefficient"
+)
+"""Columns beside a total: its parts, where it acts, the same once more."""
+_WORDS: dict[str, str] = {
+    "thrust": r"thrust|\bforce|^f[xyz]?$|axial[_ -]?load|schub|traction|empuje",
+    "torque": r"torque|moment|^m[xyz]?$|couple|drehmoment|par[_ ]motor",
+    "power": r"power|leistung",
+    "duct_thrust": r"duct|shroud|nozzle",
+    "airspeed": r"inlet[-_ ]?(velocity|speed)|(velocity|speed|\bv)[-_ ]?inlet|(advance|flight)[-_ ](speed|velocity)",
+    "cells": CELLS.pattern,
+}
+"""Headings of a quantity in CFD beside those that benches have as well (`usual`)."""
+_NOT = re.compile(r"coeff|spectral|^c[dlmt]\b|residual|^res_|^rms\[|kt\b|kq\b", re.IGNORECASE)
+_COEFFICIENT = re.compile(r"coeff|\bC[A-Z]\w*\b")
+_OTHER = {
+    "residuals": re.compile(r"residual|continuity|^res_|^(rms|max|bgs)\[", re.IGNORECASE),
+    "y+ of walls": re.compile(r"\by ?\+|y_?plus", re.IGNORECASE),
+}
+"""What a monitor may hold beside loads."""
+CHANNEL = {"thrust": "thrust_N", "duct_thrust": "duct_thrust_N", "torque": "torque_Nm", "power": "power_W"}
+"""Channel of a load."""
+VECTOR = {"thrust": "force", "torque": "moment"}
+COEFFICIENTS = ("CT", "CQ", "CP", "J")
+_MEANT = CHANNEL | {"airspeed": "airspeed_m_s", "density": "density_kg_m3"}
+
+
+@dataclass(frozen=True, eq=False)
+class LoadColumn:
+    """One column of one file of the run."""
+
+    file: str
+    name: str  # as the file has it
+    stem: str  # without its zone
+    zone: str
+    axis: str  # of a vector
+    part: str  # force, moment, or "" where only the heading tells
+    unit: str
+    record: Dataset
+
+    @property
+    def words(self) -> str:
+        """Heading without what programs append, and without its unit."""
+        word = re.sub(r"[-_ ](op|rfile)$", "", self.stem)
+        return word.removesuffix(f"_{self.unit}") if self.unit else word
+
+    @property
+    def of_reference(self) -> bool:
+        """Whether the heading is a coefficient of which only the user knows the reference: ``ct``, ``cd-1``."""
+        bare = re.fullmatch(r"c[a-z]?[a-z]([-_]\w*)?|.*coeff.*", self.words, re.IGNORECASE)
+        return bool(bare) and self.unit in ("", "-") and not self.coefficient[0]
+
+    @property
+    def coefficient(self) -> tuple[str, float]:
+        """Coefficient of a propeller that the heading names, or its advance ratio, and the factor on the values."""
+        word = re.sub(r" \d$", "", self.words)  # STAR-CCM+ numbers its reports
+        head = heading(word.upper() if re.fullmatch("(10)?k[tq]", word) else word)
+        known = head.unit is not None and head.name in COEFFICIENTS and self.unit in ("", "-")
+        return (head.name, head.unit.factor) if known and head.unit else ("", 1.0)
+
+
+def columns_of(file: str, record: Dataset, several: bool) -> list[LoadColumn]:
+    """Columns of one file that may be loads or say something of them."""
+    form = record.format
+    home = zone_of(Path(file), form) if several else ""
+    time, every = clocks_of(record)
+    clock = {time, *every}
+    out = []
+    for name in record.values:
+        if name in clock or _ASIDE.match(name):
+            continue
+        match = re.fullmatch(r"(.+?)\s*\(([^()]*)\)", name) if form != "openfoam_forces" else None
+        stem, zone = (match[1], match[2]) if match else (name, home)
+        part, axis = "", ""
+        for word, pattern in (("force", _FORCE), ("moment", _MOMENT)):
+            if (m := pattern.fullmatch(stem)) and (m[3] is None or form in ("su2_history", "flow360_forces")):
+                part, axis = word, m[1] or m[3] or ""
+        out.append(LoadColumn(file, name, stem, zone, axis, part, record.unit(name), record))
+    return out
+
+
+def recorded(found: list[LoadColumn]) -> list[LoadColumn]:
+    """Columns without what a transcript tells of the same quantity: somebody computed that at some moment."""
+    written = [c for c in found if c.record.format != "fluent_transcript"]
+    return written or found
+
+
+def other_than_loads(names: Iterable[str]) -> str:
+    """What columns of a monitor are, when they are no loads and nothing that may be one; else "".
+
+    >>> other_than_loads(["rms[Rho]", "rms[RhoE]"]), other_than_loads(["rms[Rho]", "CFx"]), other_than_loads(["lift"])
+    ('residuals', '', '')
+    """
+    own = list(names)
+    words = [re.compile(_WORDS[q], re.IGNORECASE) for q in ("thrust", "torque", "power")]
+    if any(pattern.search(name) for name in own for pattern in (_FORCE, _MOMENT, _COEFFICIENT, *words)):
+        return ""
+    return next((what for what, pattern in _OTHER.items() if any(map(pattern.search, own))), "")
+
+
+def fits(c: LoadColumn, quantity: str, told: str | None = None) -> bool:
+    """Whether a column may be a quantity, by its unit, or what is ``told`` of it, and by the words of its heading."""
+    unit, stated = unit_of(c.unit), unit_of(told or "")
+    if stated is not None and unit is not None and unit.dimension == "mass":  # kg for kgf
+        unit = stated
+    if (unit is None and _NOT.search(c.stem)) or (unit is not None and unit.dimension != QUANTITIES[quantity][0]):
+        return False
+    word = c.words
+    if quantity == "rpm":
+        return may_be_shaft_speed(word) or unit is not None
+    if c.part and c.part == VECTOR.get(quantity):
+        return True
+    if not c.part and quantity in _WORDS and re.search(_WORDS[quantity], word, re.IGNORECASE):
+        return True
+    if unit is None:  # in the words of any recording only what nothing else is
+        return quantity in ("airspeed", "density") and quantity in meanings(word)
+    name = channel_of(word.upper() if len(word) == 1 and word != "n" else word, unit.suffix)
+    return {"P_W": "power_W"}.get(name, name) == _MEANT.get(quantity)  # CFD has no electrical power
+
+
+def level(c: LoadColumn) -> float:
+    """Mean of the last fifth of a column, as the file has it."""
+    tail = c.record[c.name][-max(1, len(c.record) // 5) :]
+    return float(np.mean(tail[np.isfinite(tail)])) if np.isfinite(tail).any() else 0.0

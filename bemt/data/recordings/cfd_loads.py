@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -19,12 +19,10 @@ from bemt.base.arrays import Array, middle
 from bemt.base.errors import Fault
 from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import QUANTITIES, RunColumn, RunToml
-from bemt.data.readers.headings import CELLS, channel_of, heading, may_be_shaft_speed, meanings, other_dimension
+from bemt.data.readers.headings import other_dimension
 from bemt.data.readers.unit_text import BY_THE_CASE
-from bemt.data.recordings.cfd_files import Settled, settled, zone_of
+from bemt.data.recordings.cfd_files import CHANNEL, VECTOR, LoadColumn, Settled, fits, level, recorded, settled
 from bemt.data.recordings.cfd_setup import FLIES, Elsewhere
-from bemt.data.recordings.channels import clocks_of
-from bemt.physics.dataset import Dataset
 
 _ALONG = 3.0  # a thrust stands out of the side forces by this factor, or the shaft is not along an axis
 DUCT = re.compile(r"duct|shroud|nozzle|casing|housing|\bring\b|\blip\b|kort", re.IGNORECASE)
@@ -35,98 +33,9 @@ TURNS = re.compile(r"blade|rotor|prop|impeller|spinner|hub|nabe|(?<![a-z])fan(?!
 _SLIGHT = 0.01
 """Share of the shaft's moment that a zone of unknown part may have without being asked about [1]."""
 NET = ("net", "total", "")
-_FORCE = re.compile(r"force_total(?:_([xyz]))?(?:_N)?( along .*)?|C(?:F)([xyz])")
-_MOMENT = re.compile(r"moment_total(?:_([xyz]))?(?:_Nm)?( along .*)?|C(?:M)([xyz])")
 _DIRECTION, _NUMBER = re.compile(r"(?<=along )\([^()]*\)"), re.compile(r"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?")
 _PARALLEL = 0.1  # sine of the angle up to which two axes are one [1]
-_ASIDE = re.compile(
-    r"(force|moment)_(pressure|viscous|porous|internal)(_|\b)|center_of_pressure|(force|moment)_coefficient"
-)
-"""Columns beside a total: its parts, where it acts, the same once more."""
-_WORDS: dict[str, str] = {
-    "thrust": r"thrust|\bforce|^f[xyz]?$|axial[_ -]?load|schub|traction|empuje",
-    "torque": r"torque|moment|^m[xyz]?$|couple|drehmoment|par[_ ]motor",
-    "power": r"power|leistung",
-    "duct_thrust": r"duct|shroud|nozzle",
-    "airspeed": r"inlet[-_ ]?(velocity|speed)|(velocity|speed|\bv)[-_ ]?inlet|(advance|flight)[-_ ](speed|velocity)",
-    "cells": CELLS.pattern,
-}
-"""Headings of a quantity in CFD beside those that benches have as well (`usual`)."""
-_NOT = re.compile(r"coeff|spectral|^c[dlmt]\b|residual|^res_|^rms\[|kt\b|kq\b", re.IGNORECASE)
-_COEFFICIENT = re.compile(r"coeff|\bC[A-Z]\w*\b")
-_OTHER = {
-    "residuals": re.compile(r"residual|continuity|^res_|^(rms|max|bgs)\[", re.IGNORECASE),
-    "y+ of walls": re.compile(r"\by ?\+|y_?plus", re.IGNORECASE),
-}
-"""What a monitor may hold beside loads."""
-CHANNEL = {"thrust": "thrust_N", "duct_thrust": "duct_thrust_N", "torque": "torque_Nm", "power": "power_W"}
-"""Channel of a load."""
-_VECTOR = {"thrust": "force", "torque": "moment"}
 _TOTAL = re.compile(r"(total[-_ ]?)?(thrust|torque)([-_ ](total|op))*", re.IGNORECASE)
-COEFFICIENTS = ("CT", "CQ", "CP", "J")
-_MEANT = CHANNEL | {"airspeed": "airspeed_m_s", "density": "density_kg_m3"}
-
-
-@dataclass(frozen=True, eq=False)
-class LoadColumn:
-    """One column of one file of the run."""
-
-    file: str
-    name: str  # as the file has it
-    stem: str  # without its zone
-    zone: str
-    axis: str  # of a vector
-    part: str  # force, moment, or "" where only the heading tells
-    unit: str
-    record: Dataset
-
-    @property
-    def words(self) -> str:
-        """Heading without what programs append, and without its unit."""
-        word = re.sub(r"[-_ ](op|rfile)$", "", self.stem)
-        return word.removesuffix(f"_{self.unit}") if self.unit else word
-
-    @property
-    def of_reference(self) -> bool:
-        """Whether the heading is a coefficient of which only the user knows the reference: ``ct``, ``cd-1``."""
-        bare = re.fullmatch(r"c[a-z]?[a-z]([-_]\w*)?|.*coeff.*", self.words, re.IGNORECASE)
-        return bool(bare) and self.unit in ("", "-") and not self.coefficient[0]
-
-    @property
-    def coefficient(self) -> tuple[str, float]:
-        """Coefficient of a propeller that the heading names, or its advance ratio, and the factor on the values."""
-        word = re.sub(r" \d$", "", self.words)  # STAR-CCM+ numbers its reports
-        head = heading(word.upper() if re.fullmatch("(10)?k[tq]", word) else word)
-        known = head.unit is not None and head.name in COEFFICIENTS and self.unit in ("", "-")
-        return (head.name, head.unit.factor) if known and head.unit else ("", 1.0)
-
-
-def columns_of(file: str, record: Dataset, several: bool) -> list[LoadColumn]:
-    """Columns of one file that may be loads or say something of them."""
-    form = record.format
-    home = zone_of(Path(file), form) if several else ""
-    time, every = clocks_of(record)
-    clock = {time, *every}
-    out = []
-    for name in record.values:
-        if name in clock or _ASIDE.match(name):
-            continue
-        match = re.fullmatch(r"(.+?)\s*\(([^()]*)\)", name) if form != "openfoam_forces" else None
-        if form == "fluent_transcript" and match is None:  # residuals
-            continue
-        stem, zone = (match[1], match[2]) if match else (name, home)
-        part, axis = "", ""
-        for word, pattern in (("force", _FORCE), ("moment", _MOMENT)):
-            if (m := pattern.fullmatch(stem)) and (m[3] is None or form in ("su2_history", "flow360_forces")):
-                part, axis = word, m[1] or m[3] or ""
-        out.append(LoadColumn(file, name, stem, zone, axis, part, record.unit(name), record))
-    return out
-
-
-def _recorded(found: list[LoadColumn]) -> list[LoadColumn]:
-    """Columns without what a transcript tells of the same quantity: somebody computed that at some moment."""
-    written = [c for c in found if c.record.format != "fluent_transcript"]
-    return written or found
 
 
 @dataclass
@@ -195,7 +104,7 @@ class OpenRun:
             return hits
         taken = {getattr(self.run.columns, q).column for q in QUANTITIES if getattr(self.run.columns, q) is not None}
         free = (c for c in self.columns if not (c.name in taken or c.stem in taken or c.axis))
-        return _recorded([c for c in free if _fits(c, quantity, self.fact(quantity).unit)])
+        return recorded([c for c in free if fits(c, quantity, self.fact(quantity).unit)])
 
     def si(self, quantity: str, c: LoadColumn) -> Array | None:
         """Values of a column in SI (rev/min for a speed); a missing unit is a fault."""
@@ -210,8 +119,8 @@ class OpenRun:
             got = f"{told}, where the file says {c.unit}"
             self.fault(c, c.name, got, "the unit of the file", f"Leave out --unit {quantity}={told!r}")
             return None
-        if not c.unit and not told and ((c.part and c.axis) or (c.of_reference and quantity in _VECTOR)):
-            factor = self._reference(c, c.part or _VECTOR.get(quantity, ""))
+        if not c.unit and not told and ((c.part and c.axis) or (c.of_reference and quantity in VECTOR)):
+            factor = self._reference(c, c.part or VECTOR.get(quantity, ""))
             return None if factor is None else c.record[c.name] * factor
         if unit is None:
             usual = QUANTITIES[quantity][1]
@@ -265,19 +174,15 @@ class OpenRun:
             elif quantity == "duct_thrust":
                 sign = out.get("thrust", 1.0)
             elif value < 0 and flies and quantity == "thrust" and brakes:
-                sign, why = (
-                    1.0,
-                    f"as a pull it would give {slowest * abs(value) / shaft:.3g} times the power of the shaft",
-                )
-                self.notes.append(f"{name} is {value:.4g} in the file: kept, since {why}")
+                sign, times = 1.0, f"{slowest * abs(value) / shaft:.3g} times the power of the shaft"
+                self.notes.append(f"{name} is {value:.4g} in the file: kept, since as a pull it would give {times}")
             elif value < 0 and flies and (brakes or quantity == "thrust" or "thrust" not in loads):
                 got, may = f"{value:.4g} in the file at {slowest:.4g} m/s", "its sign: in flight a rotor may brake"
                 may += "" if quantity == "thrust" else ", and the flow may drive it"
                 self.fault(None, quantity, got, may, f"--sign {quantity}=1 keeps it, --sign {quantity}=-1 turns it")
             elif value < 0:
-                self.notes.append(
-                    f"{name} is {value:.4g} in the file: taken as positive (--sign {quantity}=1 keeps it)"
-                )
+                kept = f"--sign {quantity}=1 keeps it"
+                self.notes.append(f"{name} is {value:.4g} in the file: taken as positive ({kept})")
             out[quantity] = sign
         return out
 
@@ -318,7 +223,7 @@ class OpenRun:
                 self._another_speed(own, head.rpm)
             return np.array([head.rpm])
         if not own:
-            loads = any(_fits(c, q) for c in self.columns for q in (*CHANNEL, "airspeed"))
+            loads = any(fits(c, q) for c in self.columns for q in (*CHANNEL, "airspeed"))
             if loads or not any(c.coefficient[0] and c.record.clock == "none" for c in self.columns):
                 hint = "--rpm N; run.toml: [run] rpm = N"
                 self.fault(None, "rpm", "no speed of rotation", "rev/min of the run", hint)
@@ -340,50 +245,6 @@ class OpenRun:
                 return self.fault(c, c.name, got, "one source of the speed", usual)
 
 
-def other_than_loads(names: Iterable[str]) -> str:
-    """What columns of a monitor are, when they are no loads and nothing that may be one; else "".
-
-    >>> other_than_loads(["rms[Rho]", "rms[RhoE]"]), other_than_loads(["rms[Rho]", "CFx"]), other_than_loads(["lift"])
-    ('residuals', '', '')
-    """
-    own = list(names)
-    loads = (
-        _FORCE,
-        _MOMENT,
-        _COEFFICIENT,
-        *(re.compile(_WORDS[q], re.IGNORECASE) for q in ("thrust", "torque", "power")),
-    )
-    if any(pattern.search(name) for name in own for pattern in loads):
-        return ""
-    return next((what for what, pattern in _OTHER.items() if any(map(pattern.search, own))), "")
-
-
-def _fits(c: LoadColumn, quantity: str, told: str | None = None) -> bool:
-    """Whether a column may be a quantity, by its unit, or what is ``told`` of it, and by the words of its heading."""
-    unit, stated = unit_of(c.unit), unit_of(told or "")
-    if stated is not None and unit is not None and unit.dimension == "mass":  # kg for kgf
-        unit = stated
-    if (unit is None and _NOT.search(c.stem)) or (unit is not None and unit.dimension != QUANTITIES[quantity][0]):
-        return False
-    word = c.words
-    if quantity == "rpm":
-        return may_be_shaft_speed(word) or unit is not None
-    if c.part and c.part == _VECTOR.get(quantity):
-        return True
-    if not c.part and quantity in _WORDS and re.search(_WORDS[quantity], word, re.IGNORECASE):
-        return True
-    if unit is None:  # in the words of any recording only what nothing else is
-        return quantity in ("airspeed", "density") and quantity in meanings(word)
-    name = channel_of(word.upper() if len(word) == 1 and word != "n" else word, unit.suffix)
-    return {"P_W": "power_W"}.get(name, name) == _MEANT.get(quantity)  # CFD has no electrical power
-
-
-def _level(c: LoadColumn) -> float:
-    """Mean of the last fifth of a column, as the file has it."""
-    tail = c.record[c.name][-max(1, len(c.record) // 5) :]
-    return float(np.mean(tail[np.isfinite(tail)])) if np.isfinite(tail).any() else 0.0
-
-
 def _axis(run: OpenRun, forces: Sequence[LoadColumn], moments: Sequence[LoadColumn]) -> str:
     """Axis of the shaft: as given, else that of the largest force."""
     if run.run.run.axis:
@@ -391,7 +252,7 @@ def _axis(run: OpenRun, forces: Sequence[LoadColumn], moments: Sequence[LoadColu
     lead = forces or moments
     size: dict[str, float] = {}
     for c in lead:
-        size[c.axis] = size.get(c.axis, 0.0) + abs(_level(c))
+        size[c.axis] = size.get(c.axis, 0.0) + abs(level(c))
     axis = max(size, key=lambda a: size[a])
     side = max((v for a, v in size.items() if a != axis), default=0.0)
     if size[axis] < _ALONG * side:
@@ -402,8 +263,8 @@ def _axis(run: OpenRun, forces: Sequence[LoadColumn], moments: Sequence[LoadColu
 
 def _along_shaft(run: OpenRun, quantity: str) -> list[LoadColumn]:
     """Components of the forces or moments along the shaft, which are the thrust and the torque."""
-    vectors = {p: _recorded([c for c in run.columns if c.part == p and c.axis]) for p in ("force", "moment")}
-    own, zones = vectors.get(_VECTOR.get(quantity, ""), []), run.run.run.zones
+    vectors = {p: recorded([c for c in run.columns if c.part == p and c.axis]) for p in ("force", "moment")}
+    own, zones = vectors.get(VECTOR.get(quantity, ""), []), run.run.run.zones
     if not own:
         return []
     axis = _axis(run, [c for c in vectors["force"] if not zones or c.zone in zones], vectors["moment"])
@@ -503,7 +364,7 @@ def _on_shaft(run: OpenRun, pool: Mapping[str, LoadColumn], zones: Sequence[str]
         if absent := [z for z in told if z not in pool]:
             run.fault(None, "rotor_zones", ", ".join(absent), f"zones with a torque: {', '.join(zones)}")
         return [z for z in zones if z in told]
-    moment = {z: _level(pool[z]) for z in zones if not (run.is_duct(z) or _STILL.search(z))}
+    moment = {z: level(pool[z]) for z in zones if not (run.is_duct(z) or _STILL.search(z))}
     named = [z for z in moment if TURNS.search(z)]
     whole = sum(moment[z] for z in named or moment)
     against = [z for z in moment if moment[z] * whole < 0.0]

@@ -246,19 +246,11 @@ def _is_grid(file: str) -> bool:
         return False
 
 
-def _is_run(path: Path) -> bool:
-    """Whether a file is one that `write_run` may replace."""
-    try:
-        return readers.detect(path) == "cfd_run"
-    except InputError:
-        return False
-
-
 def write_run(run: RunToml, out: str) -> Path:
     """Write ``run.toml``, or the ``study.toml`` of several grids; its files are named relative to it."""
     path = Path(out)
     path = path if path.suffix == ".toml" else path / "run.toml"
-    if path.is_file() and not _is_run(path):
+    if path.is_file() and readers.kind_of(path) != "cfd_run":
         raise InputError(Fault("--out", "", f"{path.as_posix()}, which is no run", "a new name, or a run to replace"))
     path.parent.mkdir(parents=True, exist_ok=True)
 
@@ -270,12 +262,10 @@ def write_run(run: RunToml, out: str) -> Path:
     if head.get("rpm") is not None:
         head["rpm"] = float(f"{head['rpm']:.12g}")
     own = {"run": RunHead.model_validate(head)} | ({"grids": grids} if grids else {})
-    text = toml_text(
-        run.model_copy(update=own),
-        f"{'One condition on several grids' if run.grids else 'One CFD run'}, written by bemt import. "
-        "Give this file in place of the exports.",
-    )
-    write_atomic(path, text)
+    tables = run.model_copy(update=own).model_dump(exclude_unset=True, exclude_none=True)
+    what = "One condition on several grids" if run.grids else "One CFD run"
+    comment = f"{what}, written by bemt import. Give this file in place of the exports.\n"
+    write_atomic(path, toml_text(tables, comment))
     return path
 
 
@@ -394,8 +384,6 @@ def write_recording(
     `pole_pairs` of a speed that counts electrical revolutions; density; `ignore` headings; `rpm` and airspeed
     that no column has. InputError on what is no column, unit or quantity, and where `out` exists.
     """
-    import tomlkit
-
     path = Path(out) if out.endswith(".toml") else Path(out) / "recording.toml"
     faults: list[Fault] = []
     if path.resolve().parent != Path(file).resolve().parent:
@@ -404,11 +392,7 @@ def write_recording(
         faults.append(Fault(path.as_posix(), "", "a file that exists", "a new name", "Add the lines to it by hand"))
     document = recording_from(file, unit, column, sign, pole_pairs, density_kg_m3, faults, ignore,
                               rpm, airspeed_m_s)  # fmt: skip
-    inline = {name: tomlkit.inline_table() for name in document["columns"]}
-    for name, facts in document["columns"].items():
-        inline[name].update(facts)
-    text = tomlkit.dumps(document | {"columns": inline})
-    write_atomic(path, "# Written by bemt import. Give this file in place of the table.\n" + text)
+    write_atomic(path, toml_text(document, "Written by bemt import. Give this file in place of the table."))
     return path
 
 

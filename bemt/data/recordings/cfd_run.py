@@ -24,29 +24,29 @@ from bemt.data.readers.cfd_run import RunToml
 from bemt.data.readers.headings import channel_of, heading, meanings
 from bemt.data.readers.marks import EXPORT
 from bemt.data.recordings.cfd_files import (
+    CHANNEL,
+    COEFFICIENTS,
     PROGRAMS,
     WALLS,
+    LoadColumn,
     Settled,
     cfd_files,
     clock_of,
+    columns_of,
+    other_than_loads,
     read_run,
     settled,
     y_plus,
     zone_of,
 )
 from bemt.data.recordings.cfd_loads import (
-    CHANNEL,
-    COEFFICIENTS,
     NET,
     TURNS,
-    LoadColumn,
     OpenRun,
     across,
     by_zone,
-    columns_of,
     counted_zones,
     other_axes,
-    other_than_loads,
     same_shaft,
 )
 from bemt.data.recordings.cfd_setup import (
@@ -89,10 +89,7 @@ def run_at(path: str, rpm: float | None = None, airspeed_m_s: float | None = Non
     elif not made.is_file():
         return None
     else:
-        try:
-            kind = readers.detect(made)
-        except InputError:  # said where the file is read
-            return None
+        kind = readers.kind_of(made)
         if kind == "cfd_run":
             run = readers.read(made, kind)
             twice = [k for k in told if getattr(run.run, k) not in (None, told[k])]

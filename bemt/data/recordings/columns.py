@@ -172,10 +172,8 @@ def sticks(facts: Facts) -> Iterator[Finding]:
                 for k in (*STICKS, "rpm")
                 if k != name and k in facts.values and _varies(facts.values[k][whole])
             ]
-            text = (
-                f"{facts.values[name][rows[0]]:.6g} to the last digit in {whole.size} rows ({where_of(facts, whole)}) "
-            )
-            text += f"while {' and '.join(changes)}"
+            where = f"{whole.size} rows ({where_of(facts, whole)})"
+            text = f"{facts.values[name][rows[0]]:.6g} to the last digit in {where} while {' and '.join(changes)}"
             left = "those rows" if name == "airspeed_m_s" else "those readings"
             fix = f"is the sensor stuck? Measure these points again; {left} are left out, all but the first"
             yield Finding("stuck_sensor", facts.named(name), text, fix, tuple(rows.tolist()), "warning")
@@ -292,26 +290,20 @@ def lengths(facts: Facts) -> Iterator[Finding]:
         asked.append(("diameter_m", D, 0.015, 12.0))
         if pitch is not None:
             asked.append(("pitch_m", pitch, 0.15 * D, 3.0 * D))
-    for name, low, high in (("tip_gap_m", 1e-5, 0.03), ("wall_distance_m", 0.02, 100.0)):
+    scale = D if D is not None and 0.015 <= D <= 12.0 else None
+    for name, low, high, of in (
+        ("tip_gap_m", 1e-5, 0.03, (5e-5, 0.125)),
+        ("wall_distance_m", 0.02, 100.0, (0.05, 500.0)),
+    ):
         v = facts.get(name)
-        top = float(np.nanmax(np.abs(v))) if v is not None else 0.0
-        if v is not None and top > 0.0:
-            scale = D if D is not None and 0.015 <= D <= 12.0 else None
-            bounds = (
-                (low, high)
-                if scale is None
-                else (scale / 2e4, scale / 8)
-                if name == "tip_gap_m"
-                else (scale / 20, 500 * scale)
-            )
-            asked.append((name, top, *bounds))
+        if v is not None and (top := float(np.nanmax(np.abs(v)))) > 0.0:
+            asked.append((name, top, *((low, high) if scale is None else (of[0] * scale, of[1] * scale))))
     for name, value, low, high in asked:
         if low <= value <= high:
             continue
         fits = [e.words for e in unit_errors.errors("length", rarest=0.5) if low <= value * e.repair <= high]
-        text = f"{value:.5g} m is outside {low:.3g} to {high:.3g} m" + (
-            f" for a rotor of {D:.4g} m" if D is not None and name != "diameter_m" else ""
-        )
+        rotor = f" for a rotor of {D:.4g} m" if D is not None and name != "diameter_m" else ""
+        text = f"{value:.5g} m is outside {low:.3g} to {high:.3g} m{rotor}"
         yield Finding("length_unit", facts.named(name), text, "; or ".join(fits) or "check the length", (), "warning")
 
 

@@ -1,12 +1,11 @@
 """A public database of measured propellers into the user's cache.
 
 The publisher gives no hash, so the first archive is trusted and its SHA-256 is written beside the data
-(``.bemt-data.json``) with the hash of every file, so that what others put there or changed is told from it and never
-deleted; a later ``--refresh`` refuses an archive with another hash. The data stay the publisher's: cite
-them as they ask. Never run against the publisher's server in the tests, which use a local one.
+(``.bemt-data.json``). A folder that holds anything is never written to: to have the data anew, delete it. The data stay
+the publisher's: cite them as they ask. Never run against the publisher's server in the tests, which use a local one.
 
 Schema ``bemt.data/1``: ``kind``, ``folder``, ``url`` (or ``archive``), ``sha256``, ``bytes``, ``files``,
-``propellers``, ``refused``, ``checksum`` (``first use``, ``as recorded``, ``replaced``), ``fetched``.
+``propellers``, ``refused``, ``checksum`` (``first use``, ``as recorded``), ``fetched``.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ import shutil
 import stat
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
@@ -75,21 +74,6 @@ def _get(url: str, target: Path, progress: Progress | None) -> None:
         raise InputError(Fault(url, "", f"{have} of {total} bytes", "the whole file", "Run the command again"))
 
 
-def download(url: str, target: Path, known_sha256: str | None = None, progress: Progress | None = None) -> str:
-    """Fetch a file and check its hash; nothing is left of one that came in part or is another."""
-    target.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        _get(url, target, progress)
-        digest = file_hash(target)
-        if known_sha256 not in (None, digest):
-            hint = "The archive has changed since its first use: delete the folder of the data to accept the new one"
-            raise InputError(Fault(url, "sha256", "another hash", str(known_sha256), hint))
-    except BaseException:
-        target.unlink(missing_ok=True)
-        raise
-    return digest
-
-
 def _members(archive: zipfile.ZipFile, name: str) -> list[tuple[zipfile.ZipInfo, PurePosixPath]]:
     """Files of an archive with the places they may take; all faults at once."""
     faults: list[Fault] = []
@@ -126,11 +110,9 @@ def _members(archive: zipfile.ZipFile, name: str) -> list[tuple[zipfile.ZipInfo,
 
 @contextmanager
 def unpacked(archive: Path, folder: Path) -> Iterator[Path]:
-    """Unpack beside a folder, for a look; put in place of the folder when the block ends well."""
+    """Unpack beside a folder that is empty or not there, for a look; put in its place when the block ends well."""
     name = os.fspath(archive)
-    folder.parent.mkdir(parents=True, exist_ok=True)
     fresh = folder.with_name(f".{folder.name}.{os.getpid()}.tmp")
-    old = folder.with_name(f".{folder.name}.{os.getpid()}.old")
     shutil.rmtree(fresh, ignore_errors=True)
     try:
         try:
@@ -151,15 +133,10 @@ def unpacked(archive: Path, folder: Path) -> Iterator[Path]:
         fresh.mkdir(parents=True, exist_ok=True)
         yield fresh
         if folder.exists():
-            os.replace(folder, old)
+            folder.rmdir()
         os.replace(fresh, folder)
     finally:
         shutil.rmtree(fresh, ignore_errors=True)
-        if old.exists():
-            if folder.exists():
-                shutil.rmtree(old, ignore_errors=True)
-            else:  # the second rename failed: everything as before
-                os.replace(old, folder)
 
 
 SCHEMA = "bemt.data/1"
@@ -186,7 +163,6 @@ class FetchedData(Documented):
     propellers: int = 0
     refused: int = 0
     cite: str = ""
-    names: Mapping[str, str] | None = None  # Start of the hash of every file, by its path
     checksum: str | None = None
     fetched: bool | None = None
 
@@ -197,15 +173,12 @@ class FetchedData(Documented):
     @property
     def text(self) -> str:
         """Where the data lie and where they came from."""
-        said = {
-            "first use": "first use: the publisher gives no hash, so this one is trusted and recorded",
-            "as recorded": "as recorded at its first use",
-            "replaced": "a different archive than before, as given by --source",
-        }
+        first = self.checksum != "as recorded"
+        said = "first use: the publisher gives no hash, so this one is trusted and recorded"
         lines = [
             f"{self.kind}: {self.propellers} propellers, {self.files} files in {self.folder}",
             f"from {self.url or self.archive}, {self.bytes} bytes",
-            f"sha256 {self.sha256} ({said[self.checksum or 'first use']})",
+            f"sha256 {self.sha256} ({said if first else 'as recorded at its first use'})",
         ]
         if self.refused:
             lines.append(f"{self.refused} faults in its files; bemt lab calibrate names them")
@@ -220,70 +193,48 @@ def _record(folder: Path) -> FetchedData | None:
         return None
 
 
-def _files(folder: Path) -> dict[str, str]:
-    """Start of the hash of every file below a folder but the record, by its path there."""
-    found = (p for p in sorted(folder.rglob("*")) if p.is_symlink() or not p.is_dir())
-    names = {p.relative_to(folder).as_posix(): p for p in found}
-    return {n: "link" if p.is_symlink() else file_hash(p)[:16] for n, p in names.items() if n != RECORD}
-
-
-def _check_own(folder: Path, known: FetchedData) -> None:
-    """Refuse to replace a folder that holds more than an earlier run put there."""
-    names = known.names or {}
-    strange = [name for name, start in _files(folder).items() if names.get(name) != start]
-    if strange:
-        got = f"files added or changed since ({len(strange)}): {', '.join(strange[:5])}"
-        got += ", ..." if len(strange) > 5 else ""
-        hint = "Move them away, or name another folder with --out"
-        raise InputError(Fault(os.fspath(folder), "", got, "only what this command put there", hint))
-
-
 def get(
-    kind: str, folder: Path, source: str | Path | None = None, url: str | None = None, refresh: bool = False,
-    progress: Callable[[int, int], None] | None = None,
-) -> FetchedData:  # fmt: skip
-    """Put a database into a folder."""
+    kind: str, folder: Path, source: str | Path | None = None, url: str | None = None, progress: Progress | None = None
+) -> FetchedData:
+    """Put a database into a folder; one that is there already is only looked at."""
     from bemt.data.readers.uiuc import scan_folder
 
     if None not in (source, url):
-        raise InputError(
-            Fault("", "--url", str(url), "none with --source, which downloads nothing", "Give one of the two")
-        )
+        expected = "none with --source, which downloads nothing"
+        raise InputError(Fault("", "--url", str(url), expected, "Give one of the two"))
     known = _record(folder)
     if known is None and folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         hint = "Name an empty or new folder with --out"
         raise InputError(Fault(os.fspath(folder), "", "files that this command did not put there", "no folder", hint))
-    if known and source is None and not refresh:
-        return replace(known, names=None, folder=os.fspath(folder), checksum="as recorded", fetched=False)
-    if known:
-        _check_own(folder, known)
+    archive = folder.with_name(f".{folder.name}.zip") if source is None else Path(source)
+    if source is not None and not archive.is_file():
+        raise InputError(Fault(os.fspath(source), "", "no such file", "a zip archive", "Check the path"))
+    if known is not None:
+        if source is not None and file_hash(archive) != known.sha256:
+            hint = "Delete the folder to have the data anew, or name another with --out"
+            raise InputError(Fault(os.fspath(folder), "sha256", "data of another archive", "a new folder", hint))
+        return replace(known, folder=os.fspath(folder), checksum="as recorded", fetched=False)
+    folder.parent.mkdir(parents=True, exist_ok=True)
     address = url or URLS[kind]
-    if source is None:
-        archive = folder.with_name(f".{folder.name}.zip")
-        digest = download(address, archive, known.sha256 if known else None, progress)
-    else:
-        archive = Path(source)
-        if not archive.is_file():
-            raise InputError(Fault(os.fspath(source), "", "no such file", "a zip archive", "Check the path"))
-        digest = file_hash(archive)
     try:
+        if source is None:
+            _get(address, archive, progress)
         with unpacked(archive, folder) as fresh:
             scan = scan_folder(fresh)
             if not scan.propellers:
                 expected = "tables such as volume-1/data/apce_10x5_geom.txt"
                 raise InputError(Fault(os.fspath(archive), "", "no propeller", expected, "Is this the archive?"))
-            names = _files(fresh)
+            files = sum(p.is_file() for p in fresh.rglob("*"))
             found = FetchedData(
-                digest, kind, os.fspath(folder), address if source is None else None,
-                None if source is None else archive.name, archive.stat().st_size, len(names), len(scan.propellers),
+                file_hash(archive), kind, os.fspath(folder), address if source is None else None,
+                None if source is None else archive.name, archive.stat().st_size, files, len(scan.propellers),
                 len(scan.faults), CITE[kind],
             )  # fmt: skip
-            (fresh / RECORD).write_text(json_text(replace(found, names=names).document()), encoding="utf-8")
+            (fresh / RECORD).write_text(json_text(found.document()), encoding="utf-8")
     finally:
         if source is None:
             archive.unlink(missing_ok=True)
-    checksum = "first use" if known is None else "as recorded" if known.sha256 == digest else "replaced"
-    return replace(found, checksum=checksum, fetched=source is None)
+    return replace(found, checksum="first use", fetched=source is None)
 
 
 def folder_of(kind: str, given: str | None) -> Path:

@@ -23,7 +23,7 @@ from bemt.data.readers.cfd_run import KIND as RUN
 from bemt.data.readers.cfd_run import RunHead, RunToml
 from bemt.data.readers.marks import EXPORT
 from bemt.data.readers.split import some
-from bemt.data.readers.uiuc_tables import NO_SPEED
+from bemt.data.readers.uiuc import NO_SPEED
 from bemt.data.recordings import cfd_run
 from bemt.data.recordings.adapt import (
     Choice,
@@ -33,8 +33,7 @@ from bemt.data.recordings.adapt import (
     is_recording,
     reduction_of,
 )
-from bemt.data.recordings.cfd_files import PROGRAMS, cfd_files
-from bemt.data.recordings.cfd_loads import other_than_loads
+from bemt.data.recordings.cfd_files import PROGRAMS, cfd_files, other_than_loads
 from bemt.data.recordings.grid_study import merged, of_table
 from bemt.data.recordings.reduce import reduction
 from bemt.data.recordings.shown import INTERNAL, Imported, ImportedFile
@@ -160,13 +159,7 @@ def as_stated(files: Sequence[Any], run: Mapping[str, Any]) -> list[Any]:
 
 def is_measured(file: Any) -> bool:
     """Whether a file is a table of measurements, of whose columns units, headings and signs may be stated."""
-    if not isinstance(file, str) or Path(file).is_dir():
-        return False
-    try:
-        kind = importers.detect(file)
-    except InputError:
-        return False
-    return kind not in PROGRAMS and kind != RUN
+    return isinstance(file, str) and not Path(file).is_dir() and importers.kind_of(file) not in ("", RUN, *PROGRAMS)
 
 
 def _stated(

@@ -59,14 +59,11 @@ class Plateau:
     t1: float
     command: float | None  # Command during the stretch, in its unit
     direction: str  # ``up`` or ``down`` from the stretch before; ``first`` when there is none
-    # Mean, standard deviation and standard error of the mean by channel, in its unit; the standard error counts samples
-    # that follow each other closely as fewer than they are (see `standard_error`)
+    # Mean and standard error of the mean by channel, in its unit; the standard error counts samples that follow each
+    # other closely as fewer than they are (see `standard_error`)
     mean: Mapping[str, float]
-    sd: Mapping[str, float]
     u: Mapping[str, float]
-    n: Mapping[str, int]  # Samples used by channel
     outliers: Mapping[str, tuple[int, ...]]  # Rows dropped by channel; empty ones are left out
-    drift: Mapping[str, float]  # Change over the plateau by a straight line, relative to the mean [1]
     flags: tuple[str, ...] = ()  # ``drifts``, ``not settled``
 
 
@@ -85,7 +82,6 @@ class Plateaus:
 
     plateaus: tuple[Plateau, ...]
     dropped: tuple[Dropped, ...]
-    signal: str
     rows: int
     notes: tuple[str, ...] = field(default=())
 
@@ -183,7 +179,7 @@ def find(
     order = sorted((d for d in dropped if d.stop > d.start), key=lambda d: d.start)
     if not found:
         notes.append("no plateau was found")
-    return Plateaus(tuple(found), tuple(order), signal, n, tuple(notes))
+    return Plateaus(tuple(found), tuple(order), n, tuple(notes))
 
 
 def _checked(
@@ -357,7 +353,7 @@ def _reduce(
         stop = int(rows[len(rows) - late])
     if len(rows) - cut < LEAST_SAMPLES or stop <= first:
         return None, [Dropped(start, end, "too short after settling")]
-    mean, sd, u, n, out, drift = {}, {}, {}, {}, {}, {}
+    mean, u, out, change = {}, {}, {}, 0.0
     for name, values in data.items():
         good = np.isfinite(values[first:stop])
         if not good.any():
@@ -369,21 +365,16 @@ def _reduce(
         if far.size:
             out[name] = tuple((first + np.flatnonzero(good)[far]).tolist())
             kept, when = np.delete(kept, far), np.delete(when, far)
-        mean[name], n[name] = float(np.mean(kept)), len(kept)
-        sd[name] = float(np.std(kept, ddof=1)) if len(kept) > 1 else math.nan
-        u[name] = standard_error(kept)
+        mean[name], u[name] = float(np.mean(kept)), standard_error(kept)
         lasts = float(when[-1] - when[0])
-        if len(kept) > 2 and lasts > 0.0 and mean[name] != 0.0:
+        if name == signal and len(kept) > 2 and lasts > 0.0:  # by a straight line
             x = when - when.mean()
-            drift[name] = _product(x, kept) / _product(x, x) * lasts / abs(mean[name])
+            change = abs(_product(x, kept) / _product(x, x) * lasts)
     flags = [] if settles else ["not settled"]
-    change = abs(drift.get(signal, 0.0) * mean.get(signal, 0.0))
     # a drift counts when it also stands out of the noise and is no trifle beside the whole signal
     if change > max(DRIFT * abs(mean.get(signal, 0.0)), 3.0 * u.get(signal, 0.0), 0.005 * span):
         flags.append("drifts")
     level = None if command is None else float(np.asarray(command, dtype=float)[start])
     cuts = [Dropped(start, first, "settling"), Dropped(stop, end, "the next step begins")]
-    plateau = Plateau(
-        first, stop, float(t[first]), float(t[stop - 1]), level, "first", mean, sd, u, n, out, drift, tuple(flags)
-    )
+    plateau = Plateau(first, stop, float(t[first]), float(t[stop - 1]), level, "first", mean, u, out, tuple(flags))
     return plateau, cuts

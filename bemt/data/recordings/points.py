@@ -165,11 +165,10 @@ class Rest:
 
 @dataclass(frozen=True, eq=False)
 class TareZero:
-    """What to subtract: (N,) by channel; its uncertainty, shared by the points; drift over the rests; notes."""
+    """What to subtract: (N,) by channel; its uncertainty, shared by the points; notes, with its drift."""
 
     value: Mapping[str, Array]
     u: Mapping[str, float]
-    drift: Mapping[str, float]
     notes: tuple[str, ...]
 
 
@@ -178,12 +177,11 @@ def from_rest(when: Array, rests: Sequence[Rest], full_scale: Mapping[str, float
 
     >>> rests = [Rest(0.0, {"thrust_N": 0.1}, {}), Rest(10.0, {"thrust_N": 0.3}, {})]
     >>> zero = from_rest(np.array([5.0, 20.0]), rests, {"thrust_N": 10.0})
-    >>> zero.value["thrust_N"].round(3).tolist(), round(zero.drift["thrust_N"], 3)
-    ([0.2, 0.3], 0.2)
+    >>> zero.value["thrust_N"].round(3).tolist()
+    [0.2, 0.3]
     """
     value: dict[str, Array] = {}
     u: dict[str, float] = {}
-    drift: dict[str, float] = {}
     notes = []
     order = sorted(rests, key=lambda r: r.when)
     for name in TARED:
@@ -199,16 +197,16 @@ def from_rest(when: Array, rests: Sequence[Rest], full_scale: Mapping[str, float
         unit = name.rsplit("_", 1)[1]
         share = f" ({abs(means[-1]) / top:.2%} of the largest)" if top > 0.0 else ""
         if len(known) > 1:
-            drift[name] = means[-1] - means[0]
+            drift = means[-1] - means[0]
             u[name] = math.hypot(u[name], (max(means) - min(means)) / math.sqrt(12.0))
-            part = f", {drift[name] / top:+.2%} of the largest" if top > 0.0 else ""
+            part = f", {drift / top:+.2%} of the largest" if top > 0.0 else ""
             notes.append(
                 f"{name}: zero {means[0]:.4g} {unit} at first and {means[-1]:.4g} {unit} at last rest "
-                f"({len(known)} stretches): drift {drift[name]:+.3g} {unit}{part}; subtracted, linear in time"
+                f"({len(known)} stretches): drift {drift:+.3g} {unit}{part}; subtracted, linear in time"
             )
         else:
             notes.append(f"{name}: zero {means[0]:.4g} {unit} at rest{share} subtracted; drift unknown (one rest only)")
-    return TareZero(value, u, drift, tuple(notes))
+    return TareZero(value, u, tuple(notes))
 
 
 @dataclass(frozen=True)
@@ -458,9 +456,8 @@ def _wild(rec: Dataset, data: dict[str, Array], rest: NDArray[np.bool_], found: 
     for name, odd in wild.items():
         for j in np.flatnonzero(odd & ~every):
             i = int(np.flatnonzero(good)[j])
-            found.lost += lost(
-                rec, [i], name, f"misread: {times[name][j] ** 2:.3g} times what its row and the rest show"
-            )
+            reason = f"misread: {times[name][j] ** 2:.3g} times what its row and the rest show"
+            found.lost += lost(rec, [i], name, reason)
             data[name] = _without(data[name], [i])
     ratio = next(iter(times.values()))
     for j in np.flatnonzero(every):

@@ -31,8 +31,6 @@ from bemt.data.recordings.channels import (
     in_one_step,
     lost,
     named,
-    names_of,
-    runs_of,
     shaft_power,
     stated,
 )
@@ -50,23 +48,20 @@ from bemt.data.recordings.points import (
 from bemt.data.recordings.scatter import Hysteresis, hysteresis, repeats, session
 from bemt.physics import coefficients as co
 from bemt.physics.air import AIR_C, GAMMA, R_DRY, Air
-from bemt.physics.dataset import Dataset, concat
+from bemt.physics.dataset import Dataset
 
 
 @dataclass(frozen=True, eq=False)
 class Reduction:
     """How points were made of rows; `provenance["reduction"]` of what `reduce` gives."""
 
-    # ``samples`` or ``points``, and what decided it
-    mode: str
-    reason: str
+    mode: str  # ``samples`` or ``points``
     # By channel: ``gain`` [1], ``zero`` [unit of the channel], ``session`` [1], as far as known
     correlated: Mapping[str, Mapping[str, float]]
     dropped: tuple[DroppedCells, ...]  # Line, channel ("" for the whole row) and reason of everything that was left out
     rows: tuple[NDArray[np.intp], ...]  # (M,) rows of the recording in each point
     directions: tuple[str, ...]  # ``first``, ``up`` or ``down`` per point
     hysteresis: Mapping[str, Hysteresis]  # By channel, where both branches were recorded
-    drift: Mapping[str, float]  # Change of the zero from first to last rest, by channel [unit of the channel]
 
 
 def reduction(points: Dataset) -> Reduction:
@@ -76,9 +71,7 @@ def reduction(points: Dataset) -> Reduction:
 
 
 @np.errstate(all="ignore")  # a damaged file may hold any number; what is not finite becomes NaN or a refusal
-def reduce(
-    recording: Dataset | Sequence[Dataset], *, diameter_m: float | None = None, steady: bool | None = None
-) -> Dataset:
+def reduce(recording: Dataset, *, diameter_m: float | None = None, steady: bool | None = None) -> Dataset:
     """Reduce a recording to steady points: kind ``bench``, uncertainties the uncorrelated part, `reduction` of them.
 
     >>> values = {"rpm": [5000.0, 6000.0], "thrust_N": [4.0, 5.8], "density_kg_m3": [1.225, 1.225]}
@@ -86,67 +79,44 @@ def reduce(
     >>> reduction(got).mode, got["CT"].round(3).tolist()
     ('points', [0.113, 0.114])
     """
-    records = [recording] if isinstance(recording, Dataset) else list(recording)
-    if not records:
-        raise InputError(Fault("", "recordings", "none", "one or more"))
-    name = records[0].file or records[0].name
-    rec = _trusted(_joined([named(record) for record in records]))
-    constants = {k: v for record in reversed(records) for k, v in record.constants.items()}
+    name, constants = recording.file or recording.name, recording.constants
+    rec = _trusted(named(recording))
     if not set(LOADS) & rec.values.keys():
         got = "no thrust, torque, power, current or coefficient with a unit"
-        hint = "Name units in the headings or in a recording.toml" + in_one_step(records[0])
-        if records[0].kind == "flight":
+        hint = "Name units in the headings or in a recording.toml" + in_one_step(recording)
+        if recording.kind == "flight":
             hint = (
                 "Nothing on board weighs the thrust: give a table with thrust_N, mass times acceleration per propeller"
             )
         raise InputError(Fault(name, "", got, "one of them", hint))
-    samples, reason = (
-        is_samples(rec) if steady is None else (not steady, f"rows are taken as {'points' if steady else 'samples'}")
-    )
+    samples, reason = not steady, f"rows are taken as {'points' if steady else 'samples'}"
+    if steady is None:
+        samples, reason = is_samples(rec)
     found = from_samples(rec, name) if samples else from_rows(rec)
     _outliers(rec, found)
     if not found.points:
         reasons = ", ".join(sorted({gone.reason for gone in found.lost if not gone.channel}))
-        raise InputError(
-            Fault(name, "", f"no steady point in {number_of(len(rec), 'row')} ({reasons or 'no rows'})", "one or more")
-        )
+        got = f"no steady point in {number_of(len(rec), 'row')} ({reasons or 'no rows'})"
+        raise InputError(Fault(name, "", got, "one or more"))
     values, u = _columns(found.points)
     notes = [reason, *rec.notes, *found.notes, *_shared(values, stated(rec))]
     for key, constant in (("tip_gap_m", "gap_m"), ("wall_distance_m", "wall_distance_m")):
         if key not in values and constant in constants:
             values[key] = np.full(len(found.points), constants[constant])
-    correlated = _instrument(records, rec, values, u)
-    drift = _subtract(found, values, correlated, notes)
+    correlated = _instrument(recording, rec, values, u)
+    _subtract(found, values, correlated, notes)
     surroundings = air_of(values, len(found.points), constants)
     notes += surroundings.notes
     _fill_scatter(found, values, u, correlated, notes)
     diameter = diameter_m if diameter_m is not None else constants.get("diameter_m")
-    series = _series(records, found, rec, values, u, surroundings, diameter)
+    series = _series(recording, found, rec, values, u, surroundings, diameter)
     loops = _hysteresis(found, values, rec, notes)
     how = Reduction(
-        "samples" if samples else "points", reason, {k: dict(v) for k, v in correlated.items() if v},
+        "samples" if samples else "points", {k: dict(v) for k, v in correlated.items() if v},
         (*dropped(rec), *found.lost), tuple(p.rows for p in found.points), tuple(p.direction for p in found.points),
-        loops, drift,
+        loops,
     )  # fmt: skip
     return replace(series, provenance={**series.provenance, "reduction": how}, notes=tuple(notes))
-
-
-def _joined(parts: Sequence[Dataset]) -> Dataset:
-    """Runs one after the other, numbered through."""
-    if len(parts) == 1:
-        return parts[0]
-    run, k = [], 0
-    for v in parts:
-        labels, index = np.unique(runs_of(v), return_inverse=True)
-        run.append(k + 1.0 + index)
-        k += len(labels)
-    whole = concat([replace(v, kind="bench") for v in parts])
-    about = {
-        **parts[0].provenance,
-        "dropped": sum((dropped(v) for v in parts), ()),
-        "names": {a: b for v in parts for a, b in names_of(v).items()},
-    }
-    return replace(whole, values={**whole.values, "run": np.concatenate(run)}, provenance=about)
 
 
 def _trusted(rec: Dataset) -> Dataset:
@@ -222,27 +192,25 @@ def _shared(values: Mapping[str, Array], u: Mapping[str, Array]) -> list[str]:
 
 
 def _instrument(
-    records: Sequence[Dataset], rec: Dataset, values: Mapping[str, Array], u: dict[str, Array]
+    recording: Dataset, rec: Dataset, values: Mapping[str, Array], u: dict[str, Array]
 ) -> dict[str, dict[str, float]]:
     """Correlated parts as stated; the sample part goes into `u` where it is larger than what is there."""
-    out: dict[str, dict[str, float]] = {key: {} for key in values}
+    out: dict[str, dict[str, float]] = {}
     for key in values:
-        for record in records:
-            told = record.provenance.get("instrument", {}).get(file_name(rec, key), {})
-            out[key] |= {part: told[part] for part in ("gain", "zero") if part in told}
-            if "sample" in told:
-                u[key] = np.fmax(u[key], told["sample"])
+        told = recording.provenance.get("instrument", {}).get(file_name(rec, key), {})
+        out[key] = {part: told[part] for part in ("gain", "zero") if part in told}
+        if "sample" in told:
+            u[key] = np.fmax(u[key], told["sample"])
     return out
 
 
 def _subtract(
     found: Found, values: dict[str, Array], correlated: dict[str, dict[str, float]], notes: list[str]
-) -> dict[str, float]:
-    """Subtract the zero; gives its drift."""
-    drift: dict[str, float] = {}
+) -> None:
+    """Subtract the zero of the load cells."""
     loads = [name for name in TARED if name in values]
     if not loads:
-        return drift
+        return
     top = {name: float(np.nanmax(np.abs(values[name]))) for name in loads}
 
     def take(zero: TareZero, rows: NDArray[np.intp]) -> None:
@@ -252,9 +220,6 @@ def _subtract(
                 values[name][rows] -= zero.value[name]
                 part = correlated[name]
                 part["zero"] = math.hypot(part.get("zero", 0.0), zero.u[name])
-        for name, change in zero.drift.items():
-            if name in loads:
-                drift[name] = max(change, drift.get(name, change), key=abs)
         notes.extend(n for n in zero.notes if n.split(":")[0] in loads)
 
     runs = np.array([p.run for p in found.points])
@@ -267,7 +232,6 @@ def _subtract(
         notes.append("no rows with the motor stopped: the zero of the load cells is unknown, nothing was subtracted")
     elif bare := sorted(set(runs.tolist()) - found.rests.keys()):
         notes.append(f"runs without a motor stop, nothing subtracted: {', '.join(f'{r:g}' for r in bare)}")
-    return drift
 
 
 def _fill_scatter(
@@ -285,12 +249,9 @@ def _fill_scatter(
         if again.dof >= 3 and again.scatter > 0.0:
             missing = ~np.isfinite(u[name])
             u[name] = np.where(missing, again.scatter * np.abs(values[name]), u[name])
-            use = (
-                f"; taken as the uncertainty of {number_of(missing.sum(), 'point')} that state none"
-                if np.any(missing)
-                else ""
-            )
-            notes.append(f"{name}: repeats scatter by {again.scatter:.2%} ({again.dof} degrees of freedom){use}")
+            use = f"; taken as the uncertainty of {number_of(missing.sum(), 'point')} that state none"
+            told = f"{name}: repeats scatter by {again.scatter:.2%} ({again.dof} degrees of freedom)"
+            notes.append(told + (use if np.any(missing) else ""))
         between = session(values[name], rpm, run, _flow(values))
         if math.isfinite(between.scatter):
             correlated[name]["session"] = between.scatter
@@ -299,7 +260,7 @@ def _fill_scatter(
 
 
 def _series(
-    records: Sequence[Dataset], found: Found, rec: Dataset, values: Mapping[str, Array], u: Mapping[str, Array],
+    recording: Dataset, found: Found, rec: Dataset, values: Mapping[str, Array], u: Mapping[str, Array],
     air: AirOfPoints, diameter: float | None,
 ) -> Dataset:  # fmt: skip
     """Channels and derived ones, as a `Dataset`."""
@@ -309,8 +270,8 @@ def _series(
         shown["run"] = np.array([p.run for p in found.points])
     if np.any(np.isfinite(air.rho)):
         shown["density_kg_m3"] = air.rho
-    said = records[0].provenance
-    file = str(said.get("file", records[0].name))
+    said = recording.provenance
+    file = str(said.get("file", recording.name))
     short = file.replace("\\", "/").rsplit("/", 1)[-1]
     labels = []
     for p in found.points:
@@ -397,10 +358,9 @@ def air_of(values: Mapping[str, Array], n: int, constants: Mapping[str, float]) 
         found = _moist(values, temperature)
     if found is not None and np.any(np.isfinite(found.rho)):
         return found
-    note = (
-        "no density: no coefficients; give a column of it, or of pressure and temperature, or [air] in recording.toml"
-    )
-    return AirOfPoints(np.full(n, np.nan), _sound(temperature), (*(found.notes if found else ()), note))
+    ways = "give a column of it, or of pressure and temperature, or [air] in recording.toml"
+    notes = (*(found.notes if found else ()), f"no density: no coefficients; {ways}")
+    return AirOfPoints(np.full(n, np.nan), _sound(temperature), notes)
 
 
 def _sound(temperature: Array) -> Array:

@@ -77,14 +77,10 @@ def repeats(load: Array, rpm: Array, group: Array, flow: Array | None = None) ->
     order = good[np.lexsort((rpm[good], group[good]))]
     clusters: list[list[int]] = []
     for i in order:
-        last = clusters[-1] if clusters else None
-        if (
-            last
-            and group[last[0]] == group[i]
-            and rpm[i] <= rpm[last[0]] * (1.0 + SAME_SPEED)
-            and (flow is None or _same(flow[last[0]], flow[i]))
-        ):
-            last.append(int(i))
+        first = clusters[-1][0] if clusters else i
+        alike = group[first] == group[i] and rpm[i] <= rpm[first] * (1.0 + SAME_SPEED)
+        if clusters and alike and (flow is None or _same(flow[first], flow[i])):
+            clusters[-1].append(int(i))
         else:
             clusters.append([int(i)])
     squares, dof = 0.0, 0

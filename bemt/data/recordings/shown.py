@@ -202,9 +202,8 @@ class ImportedFile:
             lines.append(f"  {len(sums)} of {len(rows)} channels (--json has all):")
             rows = sums
         if rows:
-            lines.append(
-                tables.text_table(["channel", "unit", "mean", "drift", "averaged over"], rows, (0, 1, 4), "  ")
-            )
+            heads = ["channel", "unit", "mean", "drift", "averaged over"]
+            lines.append(tables.text_table(heads, rows, (0, 1, 4), "  "))
         if plain:
             lead = "  not averaged: " if rows else "  channels: "
             lines.append(textwrap.fill(", ".join(plain), 110, initial_indent=lead, subsequent_indent="    "))

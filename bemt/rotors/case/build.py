@@ -116,7 +116,7 @@ def stations_in(file: Path, R: float, key: str) -> BladeStations:
     from bemt.data.readers.stations import BladeStations, read_stations
 
     if key == "uiuc":
-        from bemt.data.readers.uiuc_tables import read_geometry
+        from bemt.data.readers.uiuc import read_geometry
 
         table = read_geometry(file)
         return BladeStations(table.r_R, table.c_R, np.radians(table.beta_deg))
@@ -132,7 +132,7 @@ def key_of(file: Path) -> str:
     """Key of [blade] for a file of stations, by its content: ``apc``, ``uiuc``, or our own table, ``stations``."""
     from bemt.data.readers import HEAD_BYTES, load_text
     from bemt.data.readers.apc import sniff
-    from bemt.data.readers.uiuc_tables import role_of
+    from bemt.data.readers.uiuc import role_of
 
     head = load_text(file).text[:HEAD_BYTES]
     return "apc" if sniff(head) else "uiuc" if role_of(head) == "geometry" else "stations"

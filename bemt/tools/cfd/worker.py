@@ -120,10 +120,10 @@ class Outcome:
 
 def history_of(folder: Path, settings: Settings) -> Array:
     """Read the loads of a run: rotor, and all that stands on the same mount, (N, 4)."""
-    from bemt.data.readers.openfoam_forces import read
+    from bemt.data.readers import read
 
     def column(name: str, file: str, channel: str) -> Array:
-        return np.asarray(read(folder / "postProcessing" / name / "0" / file)[channel])
+        return np.asarray(read(folder / "postProcessing" / name / "0" / file, "openfoam_forces")[channel])
 
     force, moment = (
         column("forces", "force.dat", "force_total_z_N"),
