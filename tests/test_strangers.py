@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 from collections.abc import Callable
@@ -16,7 +17,7 @@ from bemt.base.errors import InputError
 from bemt.data import readers
 from bemt.data.readers.stations import read_stations
 from bemt.data.recordings.channels import named
-from bemt.data.recordings.load import import_file
+from bemt.data.recordings.load import as_stated, import_file
 from bemt.rotors.case.words import is_case
 from geometry.common import GeometryError
 from geometry.designation import parse_designation
@@ -280,3 +281,44 @@ def test_a_case_is_told_from_a_recording_by_what_it_holds(tmp_path: Path) -> Non
     for name, text in texts.items():
         (tmp_path / f"{name}.toml").write_text(text)
     assert [is_case(str(tmp_path / f"{name}.toml")) for name in texts] == [True, True, False]
+
+
+HEADED = """{speed},{thrust},{torque}
+4000,200,0.03
+5000,310,0.047
+6000,450,0.068
+7000,610,0.092
+"""
+
+
+def test_a_misspelt_heading_is_asked_about_with_the_option_that_reads_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A speed or all loads stop the run, a load beside another is named; the option alone reads the unit in brackets."""
+    file, right = tmp_path / "bench.csv", {"speed": "RPM", "thrust": "Thrust (g)", "torque": "Torque (Nm)"}
+
+    def diagnosed(*options: str, **headings: str) -> tuple[int, str]:
+        file.write_text(HEADED.format(**(right | headings)))
+        code = main(["diagnose", str(file), "--case", "10x5", "--json", *options])
+        said = capsys.readouterr()
+        if code:
+            return code, said.err
+        return code, " ".join(json.loads(said.out)["findings"])
+
+    code, said = diagnosed(thrust="Thurst (g)", torque="Torqe (Nm)")
+    assert code == 2 and "'RPM', 'Thurst (g)', 'Torqe (Nm)'" in said
+    assert "--column thrust='Thurst (g)'" in said and "--column torque='Torqe (Nm)'" in said
+    code, said = diagnosed(speed="RMP")
+    assert code == 2 and "--column rpm=RMP" in said and "--rpm" in said
+    code, said = diagnosed(thrust="Thurst (g)")
+    assert code == 0 and "--column thrust='Thurst (g)'" in said
+    code, said = diagnosed("--column", "thrust=Thurst (g)", thrust="Thurst (g)")
+    assert code == 0 and "thrust" not in said
+    assert diagnosed()[1] == diagnosed(torque="Temp")[1] == ""
+
+
+def test_a_column_named_for_its_quantity_keeps_the_unit_in_its_brackets(tmp_path: Path) -> None:
+    file = tmp_path / "bench.csv"
+    file.write_text(HEADED.format(speed="RPM", thrust="Thurst (g)", torque="Torque (Nm)"))
+    (read,) = as_stated([str(file)], {"column": ["thrust=Thurst (g)"]})
+    assert np.allclose(read.thrust_N, 9.80665e-3 * np.array([200, 310, 450, 610]))

@@ -23,9 +23,11 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of
 from bemt.base.units import ZERO_CELSIUS
+from bemt.data.readers.split import some
 from bemt.data.recordings.channels import (
     LOADS,
     DroppedCells,
+    asks,
     dropped,
     file_name,
     in_one_step,
@@ -95,6 +97,9 @@ def reduce(
     if not set(LOADS) & rec.values.keys():
         got = "no thrust, torque, power, current or coefficient with a unit"
         hint = "Name units in the headings or in a recording.toml" + in_one_step(records[0])
+        if near := [fix for q, (_, _, fix) in asks(records[0]).items() if q in ("thrust", "torque")]:
+            hint = "; ".join([near[0][0].upper() + near[0][1:], *near[1:]])
+        got += f"; columns {some(map(repr, records[0].headings.values()), 12)}" * bool(records[0].headings)
         if records[0].kind == "flight":
             hint = (
                 "Nothing on board weighs the thrust: give a table with thrust_N, mass times acceleration per propeller"
