@@ -151,11 +151,24 @@ def as_stated(files: Sequence[Any], run: Mapping[str, Any]) -> list[Any]:
     from bemt.data.recordings.cfd_options import run_from, stated_frame
 
     if not run.get("zones") and all(hasattr(f, "columns") or is_measured(f) for f in files):
-        told = [run.get(name) or [] for name in ("unit", "column", "sign")]
+        told = [*(run.get(name) or [] for name in ("unit", "column", "sign")), run.get("pole_pairs")]
         if not any(told) and run.get("rpm") is None:
             return list(files)
         return [stated_frame(f, *told) if hasattr(f, "columns") else _stated(f, run.get("rpm"), *told) for f in files]
-    return list(runs_of(files, run_from(list(files), **run), insist=True)[0])
+    of_runs = {k: v for k, v in run.items() if k != "pole_pairs"}
+    if len(of_runs) < len(run) and run["pole_pairs"]:
+        raise InputError(Fault("", "--pole-pairs", f"{run['pole_pairs']} with these files", "tables of measurements"))
+    return list(runs_of(files, run_from(list(files), **of_runs), insist=True)[0])
+
+
+def stated_options(run: Mapping[str, Any]) -> dict[str, Sequence[str]]:
+    """Options of a command that state the columns of tables.
+
+    >>> stated_options({"unit": ["thrust=N"], "pole_pairs": 7, "zones": ["blade"]})
+    {'unit': ['thrust=N'], 'pole-pairs': ['7']}
+    """
+    columns = {name: run[name] for name in ("unit", "column", "sign") if run.get(name)}
+    return columns | ({"pole-pairs": [f"{run['pole_pairs']}"]} if run.get("pole_pairs") else {})
 
 
 def is_measured(file: Any) -> bool:
@@ -170,14 +183,15 @@ def is_measured(file: Any) -> bool:
 
 
 def _stated(
-    file: str, rpm: float | None, unit: Sequence[str], column: Sequence[str], sign: Sequence[str]
+    file: str, rpm: float | None, unit: Sequence[str], column: Sequence[str], sign: Sequence[str],
+    pole_pairs: int | None,
 ) -> Dataset:  # fmt: skip
     """A table of measurements as a recording.toml with these facts would read it."""
     from bemt.data.readers.recording_toml import RecordingToml, joined
     from bemt.data.recordings.cfd_options import filled, recording_from
 
-    if unit or column or sign:
-        made = RecordingToml.model_validate(recording_from(file, unit, column, sign))
+    if unit or column or sign or pole_pairs:
+        made = RecordingToml.model_validate(recording_from(file, unit, column, sign, pole_pairs))
         record = _finished(joined(made, Path(file).parent, file), Choice())
     else:
         record = import_file(file)

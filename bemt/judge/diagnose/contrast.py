@@ -138,7 +138,7 @@ def compare(
     Loads are compared as load / (rho n^2) on a smooth curve over ln n and V/(n D), by Gaussian processes (Rasmussen and
     Williams 2006, eq. 2.23 to 2.24 and 2.37 to 2.42). Density counts where both recordings tell it.
     """
-    from bemt.data.recordings.load import as_stated, import_file
+    from bemt.data.recordings.load import as_stated, import_file, stated_options
     from bemt.judge.diagnose.load import is_table
     from bemt.physics.dataset import Dataset, from_pandas
 
@@ -147,7 +147,7 @@ def compare(
         names[0], names[1], tuple(rows_a), tuple(rows_b), air_a, air_b, label,
         None if case is None else os.fspath(case) if isinstance(case, str | os.PathLike)
         else rotor_of(case).case.path.as_posix(), diameter_m,
-        {k: v for k, v in (run or {}).items() if k in ("unit", "column", "sign")},
+        stated_options(run or {}),
     )  # fmt: skip
     diameter_m = label_diameter(label) if diameter_m is None else diameter_m
     case = None if case is None else rotor_of(case).case
