@@ -322,3 +322,17 @@ def test_a_column_named_for_its_quantity_keeps_the_unit_in_its_brackets(tmp_path
     file.write_text(HEADED.format(speed="RPM", thrust="Thurst (g)", torque="Torque (Nm)"))
     (read,) = as_stated([str(file)], {"column": ["thrust=Thurst (g)"]})
     assert np.allclose(read.thrust_N, 9.80665e-3 * np.array([200, 310, 450, 610]))
+
+
+def test_a_lone_point_among_decimal_commas_is_refused_with_its_place(tmp_path: Path) -> None:
+    """5.910 beside 6,669 is 5910 or 5.91; a column of whole thousands, and one that proves its groups, are read."""
+    file = tmp_path / "bench.csv"
+    rows = ["4.000;2,085;985,5", "5.000;3,321;1.234,5", "6.000;{};2.000", "7.000;6,669;2.500,5"]
+    text = "\n".join(["Drehzahl (1/min);Schub (N);Leistung (W)", *rows]) + "\n"
+    file.write_text(text.format("5,910"))
+    read = named(import_file(file))
+    assert read.rpm.tolist() == [4000.0, 5000.0, 6000.0, 7000.0] and read.thrust_N[2] == 5.91
+    assert read["power_W"].tolist() == [985.5, 1234.5, 2000.0, 2500.5]
+    file.write_text(text.format("5.910"))
+    with pytest.raises(InputError, match="bench.csv: 4:2: got '5.910' among the decimal commas"):
+        import_file(file)

@@ -151,7 +151,7 @@ def as_stated(files: Sequence[Any], run: Mapping[str, Any]) -> list[Any]:
     from bemt.data.recordings.cfd_options import run_from, stated_frame
 
     if not run.get("zones") and all(hasattr(f, "columns") or is_measured(f) for f in files):
-        told = [*(run.get(name) or [] for name in ("unit", "column", "sign")), run.get("pole_pairs")]
+        told: list[Any] = [*(run.get(name) or [] for name in ("unit", "column", "sign")), run.get("pole_pairs")]
         if not any(told) and run.get("rpm") is None:
             return list(files)
         return [stated_frame(f, *told) if hasattr(f, "columns") else _stated(f, run.get("rpm"), *told) for f in files]
