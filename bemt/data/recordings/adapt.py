@@ -34,9 +34,12 @@ def is_recording(record: Dataset, adapted: bool) -> bool:
     return "rpm" in known and bool({"thrust_N", "torque_Nm", "power_W"} & known)
 
 
-def findings(record: Dataset) -> tuple[Finding, ...]:
-    """Faults of a recording."""
-    return check(record) if record.kind in ("bench", "table") else ()
+def findings(
+    record: Dataset, diameter_m: float | None = None, density_kg_m3: float | None = None
+) -> tuple[Finding, ...]:
+    """Faults of a recording, of a rotor as far as it is known."""
+    measured = record.kind in ("bench", "table")
+    return check(record, diameter_m=diameter_m, density_kg_m3=density_kg_m3) if measured else ()
 
 
 def reduction_of(record: Dataset) -> Dataset | str:

@@ -117,8 +117,12 @@ def _unsettled(record: Dataset) -> list[str]:
 def import_files(
     paths: Iterable[str | os.PathLike[str]], format: str | None = None, choice: Choice | None = None,  # noqa: A002
     run: RunToml | None = None, insist: bool = False, stated: Mapping[str, Dataset] = {},  # noqa: B006
+    rotor: tuple[float, float] | None = None,
 ) -> Imported:  # fmt: skip
-    """Read files, those of `stated` as the user states them; with ``insist`` they must be the CFD run of ``run``."""
+    """Read files, those of `stated` as the user states them; with ``insist`` they must be the CFD run of ``run``.
+
+    `rotor`: diameter [m] and density [kg/m3] of the case, as far as it is known.
+    """
     names = [os.fspath(path) for path in paths]
     runs, to_do = runs_of(names, run, insist)
     if runs or to_do:
@@ -137,7 +141,9 @@ def import_files(
         to_do = None
     told = {d.file for d in runs}
     runs = [*runs, *(d for d in records.values() if cfd_run.is_run(d) and d.file not in told)]
-    files = [_file(name, format, records.get(name), errors.get(name)) for name in names]
+    if rotor is not None:
+        runs = [cfd_run.of_rotor(d, *rotor) if cfd_run.is_run(d) else d for d in runs]
+    files = [_file(name, format, records.get(name), errors.get(name), rotor or ()) for name in names]
     return Imported(tuple(files), tuple(d for d in runs if cfd_run.is_run(d)), to_do)
 
 
@@ -271,14 +277,14 @@ def _refusal(error: Exception) -> str:
 
 
 def _file(
-    name: str, format: str | None, record: Dataset | None, error: str | None  # noqa: A002
+    name: str, format: str | None, record: Dataset | None, error: str | None, rotor: Sequence[float]  # noqa: A002
 ) -> ImportedFile:  # fmt: skip
     if record is None:
         return ImportedFile(name, format, error=error)
     try:
         reduced = _reduced(record)
         found = ImportedFile(name, record.format, record, reduced, _means(record, reduced),
-                             findings(record), record.notes, error)  # fmt: skip
+                             findings(record, *rotor), record.notes, error)  # fmt: skip
         found.document()  # what cannot be shown is refused with its file
     except Exception as failed:
         return ImportedFile(name, format, error=_refusal(failed))
@@ -307,11 +313,14 @@ def check_format(name: str | None) -> None:
         raise InputError(Fault("", "--format", repr(name), f"one of {', '.join(importers.importers())}"))
 
 
-def as_dataset(record: Dataset) -> Dataset:
-    """Points of what was read: steady points of a recording, rows of a table, else one point of means."""
+def as_dataset(record: Dataset, rotor: Sequence[float] = ()) -> Dataset:
+    """Points of what was read: steady points of a recording, rows of a table, else one point of means.
+
+    `rotor`: diameter [m] and density [kg/m3] of the case, where one is known.
+    """
     if cfd_run.is_run(record):
         return record
-    notes = [*record.notes, *(f"{f.severity}: {f.id} in {f.channel}: {f.evidence}" for f in findings(record))]
+    notes = [*record.notes, *(f"{f.severity}: {f.id} in {f.channel}: {f.evidence}" for f in findings(record, *rotor))]
     reduced = _reduced(record)
     if isinstance(reduced, Dataset):
         return replace(reduced, notes=(*reduced.notes, *notes))

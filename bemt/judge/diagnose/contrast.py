@@ -172,7 +172,8 @@ def compare(
             read.append(with_air(selected(whole, rows, name), air, option))
     refuse(faults)
     D = case.diameter_m if case is not None and diameter_m is None else diameter_m
-    findings = [_findings(imported, D, case is not None and case.ducted) for imported in read]
+    rho = None if case is None else float(case.air().rho)
+    findings = [_findings(imported, D, case is not None and case.ducted, rho) for imported in read]
     read = [_sound(imported, found) for imported, found in zip(read, findings, strict=True)]
     runs = []
     for name, rows, imported in zip(names, conditions, read, strict=True):
@@ -243,11 +244,14 @@ def _write(out: Path, found: Contrast | Told, figures: bool, files: Sequence[str
         write_atomic(out / f"{FIRST}.png", first_picture(records, cases)[0].png())
 
 
-def _findings(imported: Dataset, diameter_m: float | None, ducted: bool) -> tuple[Finding, ...]:
+def _findings(
+    imported: Dataset, diameter_m: float | None, ducted: bool, density_kg_m3: float | None
+) -> tuple[Finding, ...]:
     """What cannot be so in a recording, what it leaves open or out, as ``import`` and ``diagnose`` find it."""
     from bemt.data.recordings.check import OPEN_OR_OUT, check
 
-    found = check(imported, diameter_m=diameter_m, ducted=ducted) if imported.kind in ("bench", "table") else ()
+    of_rotor = {"diameter_m": diameter_m, "density_kg_m3": density_kg_m3}
+    found = check(imported, ducted=ducted, **of_rotor) if imported.kind in ("bench", "table") else ()
     # a propeller that windmills pulls the other way; signs have a note of their own
     return tuple(f for f in found if (f.severity == "error" or f.id in OPEN_OR_OUT) and f.id != "sign_flipped")
 
