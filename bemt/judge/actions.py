@@ -30,7 +30,8 @@ __all__ = ["calibrate_rotor", "compare", "diagnose", "plan", "prove"]
 @action(
     "Recordings", "diagnose log.csv --case cases/prop_8x5", words=("recordings",), shown=True,
     common=("case", "reference", "ruled_out", "changed", "only", "rpm", "airspeed_m_s", "out"),
-    elsewhere=dict.fromkeys(("--air", "--air-a", "--air-b"), "State --density-kg-m3 1.19, or [air] in the case."),
+    elsewhere=dict.fromkeys(("--air", "--air-a", "--air-b", "--temperature-C", "--pressure-hPa"), (
+        "State --density-kg-m3 1.19, or temperature_C and pressure_hPa in [air] of the case or of a recording.toml.")),
 )  # fmt: skip
 def diagnose(
     recordings: Recording | Sequence[Recording], case: Propeller | Path | Sequence[Propeller | Path], *,

@@ -43,7 +43,7 @@ CELLS_PER_BLADE, MORE_A_LEVEL = 34_600, 3.6
 
 def first_cell(s: Settings) -> float:
     """Height of the cells on the blades; the grid has no layers. [m]"""
-    return s.base_cell / 2**SURFACE_LEVEL
+    return float(s.base_cell / 2**SURFACE_LEVEL)
 
 
 def y_plus(s: Settings, chord_m: float) -> float:
@@ -61,7 +61,7 @@ def cells(s: Settings) -> float:
     """Number of cells; NaN for what no own run measured. [1]"""
     if s.domain != "free" or s.duct is not None or s.body is not None or _narrow(s)[0]:
         return math.nan
-    return CELLS_PER_BLADE * s.B / s.sectors * MORE_A_LEVEL ** (s.level - 5.0)
+    return float(CELLS_PER_BLADE * s.B / s.sectors * MORE_A_LEVEL ** (s.level - 5.0))
 
 
 def _graded(length: float, first: float) -> tuple[int, float]:
