@@ -611,7 +611,7 @@ def test_pole_pairs_are_stated_where_a_recording_is_read(tmp_path: Path, capsys:
     assert "--pole-pairs" in capsys.readouterr().err
     assert main(["diagnose", str(tmp_path / "silent.csv"), "--case", "10x5"]) == 0
     said = " ".join(capsys.readouterr().out.replace("-\n", "-").split())
-    about = re.search(r"divide by the pole pairs, about (\d+) by the loads .*?: --pole-pairs N", said)
+    about = re.search(r"divide by about (\d+) pole pairs \(half the magnets .*?; --pole-pairs N\)", said)
     assert about and 6 <= int(about[1]) <= 8, "the loads do not know the model to a pair: no count is a fact"
     export = tmp_path / "cl-rfile.out"
     export.write_text('"lift-rfile"\n"Iteration" "lift"\n("Iteration" "lift")\n1 2.5\n2 2.6\n3 2.6\n')

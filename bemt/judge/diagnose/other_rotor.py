@@ -287,8 +287,8 @@ def _slips(problem: Problem, found: dict[str, float]) -> Iterator[_Slip]:
             off, whole = dict.fromkeys(found, -2.0 * math.log(miscount.ratio)), miscount.set == 1
             words = miscount.words
             if whole:  # loads go with the square of the speed, and no model knows them to a pair
-                slip, about = words.partition(":")[0], f"about {miscount.true} by the loads"
-                words = f"{slip}: divide by the pole pairs, {about} (half the magnets of the motor): --pole-pairs N"
+                slip, pairs = words.partition(":")[0], f"about {miscount.true} pole pairs"
+                words = f"{slip}: divide by {pairs} (half the magnets of the motor; --pole-pairs N)"
             yield "poles" if whole else "divided twice", words, off, 0.5 + miscount.rarity
     for error in unit_errors.errors("rotation"):
         yield "speed", f"rpm: {error.words}", dict.fromkeys(found, -2.0 * math.log(error.factor)), 1.0 + error.rarity
