@@ -182,6 +182,19 @@ def test_slices_are_compared_at_the_speed_of_the_recording(tmp_path: Path) -> No
     (told,) = found.to_dict()["along_blade"].values()
     assert "at 6000 rev/min" in told["state"] and not told["whole"] and not told["named"]
     assert np.allclose(told["thrust_ratio"], 1.0, atol=0.01)
+    over = made[0] / model.rotor.R
+    ratio = slices(tmp_path, "ratio.csv", "r/R,dT/dr [N/m],dQ/dr [N m/m]", 1.0, (over, *made[1:]))
+    plot = tmp_path / "plot.xy"
+    curves = ("\n".join(f"{x:.9g}\t{y:.9g}" for x, y in zip(over, v, strict=True)) for v in made[1:])
+    keys = ("dT/dr [N/m]", "dQ/dr [N m/m]")
+    text = "".join(f'((xy/key/label "{k}")\n{c}\n)\n\n' for k, c in zip(keys, curves, strict=True))
+    plot.write_text(f'(title "loads")\n(labels "r/R" "per radius")\n\n{text}')
+    for other in (ratio, plot):
+        (same,) = bemt.diagnose(run, case, along=other).to_dict()["along_blade"].values()
+        assert np.allclose(same["thrust_ratio"], told["thrust_ratio"], rtol=1e-6) and same["whole"] == told["whole"]
+    plot.write_text(f'(title "v")\n(labels "Position" "Axial Velocity")\n\n{text}'.replace(keys[0], "inlet"))
+    with pytest.raises(InputError, match="a Fluent XY plot of 'Axial Velocity' over 'Position', curves 'inlet'"):
+        bemt.diagnose(run, case, along=plot)
     (told,) = bemt.diagnose(run, case, along=path, rpm=6500).to_dict()["along_blade"].values()
     assert "at 6500 rev/min" in told["state"] and min(told["thrust_ratio"]) > 1.1
     assert "readings are at 6000 rev/min" in told["state"]  # two speeds: both are said

@@ -7,6 +7,7 @@ import io
 import json
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -298,3 +299,29 @@ def test_a_throttle_without_its_unit_is_percent_where_it_can_be_nothing_else(
     if code == 0:
         first = next(line for line in capsys.readouterr().out.splitlines() if line.strip()[:1].isdigit())
         assert float(first.split()[0]) == pytest.approx(1200.0)
+
+
+def limited(limit_A: float) -> Dataset:
+    """A drive whose supply holds 12 V up to a current, and that current above it."""
+    pulse = np.linspace(1100.0, 2000.0, 19)
+    wanted = made(pulse)
+    volts = np.where(wanted.current_A > limit_A, 12.0 * (limit_A / wanted.current_A) ** 0.4, 12.0)
+    given = made(pulse, volts)
+    return replace(given, values=dict(given.values) | {"current_A": np.minimum(wanted.current_A, limit_A)})
+
+
+def test_a_supply_in_its_current_limit_bounds_the_map_and_it_is_said() -> None:
+    whole, short = limited(100.0), bench_map._below_limit(limited(12.0))
+    assert bench_map._below_limit(whole) is whole
+    chart = bench_map.fit(short)
+    assert 0.0 < np.max(short.current_A) <= 12.0 and chart.pulse_range_us[1] <= 1700.0
+    assert not chart.with_voltage and chart.full_thrust_N <= 1.01 * np.max(limited(12.0).thrust_N)
+    assert any("current limit" in note and "12 A" in note for note in chart.notes)
+    falling = limited(12.0).select(np.arange(19)[::-1])
+    assert np.array_equal(np.sort(bench_map._below_limit(falling).pulse_us), short.pulse_us)
+
+
+def test_an_emptying_battery_is_no_supply_in_its_limit() -> None:
+    runs = [made(LEVELS[2:], volts) for volts in np.linspace(12.6, 10.8, 4)]
+    log = join([replace(run, provenance={"ramp": False}) for run in runs])
+    assert bench_map._below_limit(log) is log

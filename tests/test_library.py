@@ -15,8 +15,10 @@ import pandas as pd
 import pytest
 
 import bemt
+from bemt.physics.effects import catalogue, source_of
 from bemt.rotors.case import load_case
 from bemt.rotors.case.prepare import prepare_case
+from bemt.rotors.case.sources import Source, Sources, bibtex
 
 SPEEDS = np.arange(4000.0, 9001.0, 500.0)
 FRAME = pd.DataFrame({"rpm": SPEEDS, "thrust_N": 1e-7 * SPEEDS**2})
@@ -322,6 +324,47 @@ def test_the_sources_of_an_answer_are_bibtex(project: Path) -> None:
     assert all("author = {" in line and "year = {" in line for line in entries)
     notes = [re.search(r"note = \{(.*?); in ", line)[1] for line in entries if "; in " in line]  # type: ignore[index]
     assert all(re.match(r"[A-Za-z]", note) and not re.search("`|=$", note) for note in notes), notes
+
+
+def bibtex_entries(text: str) -> dict[str, dict[str, str]]:
+    """Entries and their fields as BibTeX scans them: what is not in an entry is no @, and every brace counts."""
+    out: dict[str, dict[str, str]] = {}
+    at = 0
+    while (at := text.find("@", at)) >= 0:
+        head = re.compile(r"@(\w+)\{([^\s,{}@%#\\]+),").match(text, at)
+        assert head, text[at : at + 60]
+        fields, place = {"type": head[1]}, head.end()
+        while not (end := re.compile(r"\s*\}").match(text, place)):
+            name = re.compile(r"\s*(\w+) = \{").match(text, place)
+            assert name, text[place : place + 60]
+            place, depth = name.end(), 1
+            while depth:
+                depth += {"{": 1, "}": -1}.get(text[place], 0)
+                place += 1
+            assert name[1] not in fields
+            fields[name[1]] = text[name.end() : place - 1]
+            place += text[place] == ","
+        assert head[2] not in out
+        out[head[2]], at = fields, end.end()
+    return out
+
+
+REQUIRED = {"misc": {"author", "year", "note"}}
+"""Fields by type of entry: BibTeX asks for none of a @misc, and prints nothing without one of these."""
+
+
+def test_every_source_compiles_as_bibtex(project: Path) -> None:
+    """Those of every effect, and what a user wrote into a table of references."""
+    of_effects = [Source("effect", name, source_of(cls)) for name, cls in catalogue().items()]
+    odd = Source("data", "odd", r"Müller and O'Neil (2019), {half \ a brace, 100 % of #1 ~ x^2 & y_z, me@there.org")
+    bare = Source("data", "mail", "asked of someone@there.org {")
+    entries = bibtex_entries(bibtex(Sources((Source("method", "program", ""), *of_effects, odd, bare))))
+    entries |= bibtex_entries(bemt.cite(project / "cases" / "ds30").bibtex())
+    assert {"bemt", "muller2019", "ning2014"} <= entries.keys() and len(entries) > 40
+    for key, fields in entries.items():
+        assert REQUIRED[fields["type"]] <= fields.keys() and key.isascii(), key
+        for name, value in fields.items():
+            assert value.strip() and (name == "doi" or not re.search(r"(?<!\\)[&%$#_~^]", value)), (key, name, value)
 
 
 def test_numbers_of_numpy_are_numbers_and_answers_are_plain_values() -> None:

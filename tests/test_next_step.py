@@ -7,9 +7,11 @@ from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
+import pandas as pd
 import pytest
 from diagnosing import case, compressibility_missed, points, recording
 
+import bemt
 from bemt.judge import loss
 from bemt.judge.diagnose import chain, knowledge, other_rotor, posterior, suggest
 from bemt.judge.diagnose.assemble import build
@@ -221,3 +223,14 @@ def test_no_run_is_asked_for_beyond_what_the_stand_may_do(compared: chain.Diagno
     flow = SimpleNamespace(R=part.flow.R, J=part.flow.J, M_tip=np.array([0.3]), ducted=False)
     runs = [option.rpm.max() for option in suggest._options(SimpleNamespace(record=record, flow=flow))]
     assert bool(max(runs) > 1.02 * record.rpm.max()) is faster
+
+
+@pytest.mark.parametrize("torque", [True, False])
+def test_a_low_thrust_without_a_reference_asks_for_dead_weights_before_the_blades(torque: bool) -> None:
+    """The cell is checked before the rotor is doubted; a torque, which a gain leaves as it is, is asked for if none."""
+    d = bemt.propeller("10x5").solve(rpm=[4000, 5000, 6000, 7000, 8000, 9000])
+    frame = {"rpm": d.rpm, "thrust_N": 0.7 * d.thrust_N} | ({"torque_Nm": d.torque_Nm} if torque else {})
+    text = bemt.diagnose(pd.DataFrame(frame), "10x5", figures=False).text
+    _, said = " ".join(text.split()).split("without such a reference: ")
+    assert "hang dead weights on the cell" in said.partition("measure the diameter")[0]
+    assert ("record the torque" in said) != torque

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import hashlib
 import math
 import os
@@ -21,7 +22,8 @@ from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.rotors.case import load_case
 from bemt.tools.cfd.openfoam import Body, RunSweep, Settings, case_files
-from bemt.tools.cfd.openfoam.grid import extent, mrf_zone
+from bemt.tools.cfd.openfoam.grid import MEAN_Y_PLUS, extent, first_cell, mrf_zone, y_plus
+from bemt.tools.cfd.openfoam.grid import cells as cells_of
 from bemt.tools.cfd.openfoam.write import Run, settings_of, write_openfoam
 from bemt.tools.cfd.worker import history_of
 from geometry.mesh import Options
@@ -206,6 +208,29 @@ def test_cells_scale_with_the_level_alone() -> None:
     a, b = (parse(case_files(s)["system/snappyHexMeshDict"])["castellatedMeshControls"] for s in (coarse, fine))
     assert a == b
     assert settings(level=6.0).base_cell / 2**6 == pytest.approx(0.1 / 2**8)
+
+
+@pytest.mark.parametrize("name", ["prop_8x5_grid", "prop_8x5_rest", "prop_10x5", "prop_12x6", "prop_14x8"])
+def test_cells_and_y_plus_are_told_before_the_grid_is_made(name: str, project: Path) -> None:
+    """Within what the committed runs of open rotors at rest had."""
+    case = load_case(project / "cases" / ("prop_8x5" if "8x5" in name else name))
+    chord = float(case.rotor().blade.at(0.75 * case.diameter_m / 2)[0])
+    with (project / "reports" / "cfd" / name / "recording.csv").open() as stream:
+        rows = [row for row in csv.DictReader(stream) if row["yplus_avg"] and row["sector"] == "half"]
+    assert rows
+    for row in rows:
+        run = Run(rpm=float(row["rpm"]), airspeed_m_s=0.0, level=float(row["level"]))
+        s, shapes = settings_of(case, run)
+        assert cells_of(s) == pytest.approx(float(row["cells"]), rel=0.25)
+        assert MEAN_Y_PLUS[0] <= float(row["yplus_avg"]) / y_plus(s, chord) <= MEAN_Y_PLUS[1]
+        assert any("expected grid: about" in note and "y+ near" in note for note in shapes.notes)
+
+
+def test_the_first_cell_halves_with_a_level_and_a_duct_has_no_count() -> None:
+    plain, fine = settings(), settings(level=settings().level + 1.0)
+    assert first_cell(plain) == pytest.approx(2.0 * first_cell(fine)) == pytest.approx(plain.R / 2 ** (plain.level + 2))
+    assert y_plus(plain, 0.02) == pytest.approx(2.0 * y_plus(fine, 0.02))
+    assert math.isnan(cells_of(settings(domain="pipe"))) and cells_of(plain) > 0.0
 
 
 @pytest.mark.parametrize(

@@ -189,6 +189,32 @@ def test_a_sheet_of_numbers_that_were_typed_as_text_is_the_one_that_holds_any(tm
     assert import_file(tmp_path / "a.xlsx")["thrust_N"] == pytest.approx(np.array([100.5, 180.2, 283.9]) * 9.80665e-3)
 
 
+@pytest.mark.parametrize(
+    ("typed", "read"),
+    [
+        (["2,08", "3,32", "5.91"], [2.08, 3.32, 5.91]), ([2.085, "3,321", 5.91], "B3"),
+        (["2,085", "3,321", "5,910"], "B2"), (["0,085", "3,321", "5,910"], [0.085, 3.321, 5.91]),
+        (["2,1", "3,3", "5.910"], "B4"), (["985,5", "1.234,5", "2.000"], [985.5, 1234.5, 2000.0]),
+        (["985.5", "1,234.5", "2,000"], [985.5, 1234.5, 2000.0]),
+    ],
+)  # fmt: skip
+def test_numbers_typed_as_text_beside_numbers_are_read_where_they_can_be_but_one(
+    tmp_path: Path, typed: list[object], read: list[float] | str
+) -> None:
+    """Else the cell is named: 2,085 is thousands in one country and decimals in another."""
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for row in (["Drehzahl (U/min)", "Schub (N)"], *zip((3000, 4000, 5000), typed, strict=True)):
+        book.active.append(row)
+    book.active.title = "Messung"
+    book.save(tmp_path / "a.xlsx")
+    if isinstance(read, str):
+        with pytest.raises(InputError, match=f"a.xlsx: sheet 'Messung', cell {read}: got .* as text.*Thousands"):
+            import_file(tmp_path / "a.xlsx")
+    else:
+        assert import_file(tmp_path / "a.xlsx")["thrust_N"] == pytest.approx(np.array(read), rel=1e-12)
+
+
 def test_a_mark_in_the_name_of_a_file_is_no_sheet(tmp_path: Path) -> None:
     (tmp_path / "run#2.csv").write_bytes(text(ROWS))
     assert len(import_file(tmp_path / "run#2.csv")) == len(ROWS) - 1

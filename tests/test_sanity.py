@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Callable
@@ -11,6 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import bemt
+from bemt.app.cli import main
 from bemt.base import units
 from bemt.base.errors import InputError
 from bemt.data.recordings.check import Finding, check
@@ -611,3 +614,29 @@ def test_the_names_of_propellers_tell_sizes_with_which_nothing_is_found(shared_d
     for file, (diameter, pitch) in SIZE.items():
         found = {f.id for f in check(import_file(shared_data / file), diameter_m=diameter, pitch_m=pitch)}
         assert found <= ({"power_above_input"} if file == MN2206 else set()), file
+
+
+def test_a_rotor_in_water_is_judged_by_the_diameter_and_the_fluid_of_its_case(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Neither a guessed diameter nor the density of air makes a slip of a unit of sound loads; with no case, one is."""
+    file = bemt.propeller("10x10", rpm=900).write(tmp_path / "ship")
+    text = re.sub(r"(?m)^density_kg_m3 = .*", 'fluid = "water"', file.read_text())
+    whole, *assumptions = text.split("[[assumptions]]")
+    file.write_text("[[assumptions]]".join([whole, *(a for a in assumptions if "air.density" not in a)]))
+    case, at = str(file), np.array([700.0, 800.0, 900.0, 1000.0])
+    d = bemt.load(case).solve(rpm=at, airspeed_m_s=2.0)
+    lines = [f"{n:.0f},2,{T:.4f},{Q:.5f}" for n, T, Q in zip(at, d.thrust_N, d.torque_Nm, strict=True)]
+    (tmp_path / "tank.csv").write_text("\n".join(["n (rpm),V (m/s),Thrust (N),Torque (Nm)", *lines]) + "\n")
+    for name, v in (("thrust", d.thrust_N[2]), ("torque", d.torque_Nm[2])):
+        rows = "".join(f"{i} {v:.5f}\n" for i in range(1, 40))
+        (tmp_path / f"{name}.out").write_text(f'"{name}"\n"Iteration" "{name}"\n("Iteration" "{name}")\n{rows}')
+    cfd = [str(tmp_path / "thrust.out"), str(tmp_path / "torque.out"), "--rpm", "900", "--airspeed-m-s", "2"]
+    cfd += ["--unit", "thrust=N", "torque=Nm"]
+    for files in ([str(tmp_path / "tank.csv")], cfd):
+        assert main(["import", *files]) == 0
+        assert "diameter guessed" in capsys.readouterr().out
+        assert main(["import", *files, "--case", case]) == 0
+        assert "Suggestion" not in capsys.readouterr().out
+    assert main(["diagnose", str(tmp_path / "tank.csv"), "--case", case, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["findings"] == []

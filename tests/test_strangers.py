@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 from collections.abc import Callable
@@ -16,7 +17,7 @@ from bemt.base.errors import InputError
 from bemt.data import readers
 from bemt.data.readers.stations import read_stations
 from bemt.data.recordings.channels import named
-from bemt.data.recordings.load import import_file
+from bemt.data.recordings.load import as_stated, import_file
 from bemt.rotors.case.words import is_case
 from geometry.common import GeometryError
 from geometry.designation import parse_designation
@@ -280,3 +281,58 @@ def test_a_case_is_told_from_a_recording_by_what_it_holds(tmp_path: Path) -> Non
     for name, text in texts.items():
         (tmp_path / f"{name}.toml").write_text(text)
     assert [is_case(str(tmp_path / f"{name}.toml")) for name in texts] == [True, True, False]
+
+
+HEADED = """{speed},{thrust},{torque}
+4000,200,0.03
+5000,310,0.047
+6000,450,0.068
+7000,610,0.092
+"""
+
+
+def test_a_misspelt_heading_is_asked_about_with_the_option_that_reads_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A speed or all loads stop the run, a load beside another is named; the option alone reads the unit in brackets."""
+    file, right = tmp_path / "bench.csv", {"speed": "RPM", "thrust": "Thrust (g)", "torque": "Torque (Nm)"}
+
+    def diagnosed(*options: str, **headings: str) -> tuple[int, str]:
+        file.write_text(HEADED.format(**(right | headings)))
+        code = main(["diagnose", str(file), "--case", "10x5", "--json", *options])
+        said = capsys.readouterr()
+        if code:
+            return code, said.err
+        return code, " ".join(json.loads(said.out)["findings"])
+
+    code, said = diagnosed(thrust="Thurst (g)", torque="Torqe (Nm)")
+    assert code == 2 and "'RPM', 'Thurst (g)', 'Torqe (Nm)'" in said
+    assert "--column thrust='Thurst (g)'" in said and "--column torque='Torqe (Nm)'" in said
+    code, said = diagnosed(speed="RMP")
+    assert code == 2 and "--column rpm=RMP" in said and "--rpm" in said
+    code, said = diagnosed(thrust="Thurst (g)")
+    assert code == 0 and "--column thrust='Thurst (g)'" in said
+    code, said = diagnosed("--column", "thrust=Thurst (g)", thrust="Thurst (g)")
+    assert code == 0 and "thrust" not in said
+    assert diagnosed()[1] == diagnosed(torque="Temp")[1] == ""
+
+
+def test_a_column_named_for_its_quantity_keeps_the_unit_in_its_brackets(tmp_path: Path) -> None:
+    file = tmp_path / "bench.csv"
+    file.write_text(HEADED.format(speed="RPM", thrust="Thurst (g)", torque="Torque (Nm)"))
+    (read,) = as_stated([str(file)], {"column": ["thrust=Thurst (g)"]})
+    assert np.allclose(read.thrust_N, 9.80665e-3 * np.array([200, 310, 450, 610]))
+
+
+def test_a_lone_point_among_decimal_commas_is_refused_with_its_place(tmp_path: Path) -> None:
+    """5.910 beside 6,669 is 5910 or 5.91; a column of whole thousands, and one that proves its groups, are read."""
+    file = tmp_path / "bench.csv"
+    rows = ["4.000;2,085;985,5", "5.000;3,321;1.234,5", "6.000;{};2.000", "7.000;6,669;2.500,5"]
+    text = "\n".join(["Drehzahl (1/min);Schub (N);Leistung (W)", *rows]) + "\n"
+    file.write_text(text.format("5,910"))
+    read = named(import_file(file))
+    assert read.rpm.tolist() == [4000.0, 5000.0, 6000.0, 7000.0] and read.thrust_N[2] == 5.91
+    assert read["power_W"].tolist() == [985.5, 1234.5, 2000.0, 2500.5]
+    file.write_text(text.format("5.910"))
+    with pytest.raises(InputError, match="bench.csv: 4:2: got '5.910' among the decimal commas"):
+        import_file(file)

@@ -30,6 +30,7 @@ from bemt.physics.k1k2 import U_MEASURED
 from bemt.results.sweep import batch, fingerprint
 from bemt.results.sweep import batch as sweep_module
 from bemt.results.sweep import grid as grid_module
+from bemt.results.sweep.answer import _agreement
 from bemt.results.sweep.answer import summary as summary_of
 from bemt.results.sweep.case import solve_case
 from bemt.results.sweep.rows import Comparison, Result
@@ -508,6 +509,9 @@ def test_a_flagged_point_is_no_plain_agreement() -> None:
     flagged = replace(plain, doubts=("supersonic tip",))
     assert stand(plain)[0] == "same" and stand(flagged)[0] != "same" and "supersonic tip" in stand(flagged)[1]
     assert "supersonic tip" in flagged.verdict and "supersonic tip" not in plain.verdict
+    far, open_ = (Comparison(S=150.0, D=100.0, u_input=5.0, u_D=u, doubts=flagged.doubts) for u in (0.5, math.nan))
+    told = [_agreement(c) for c in (plain, flagged, replace(flagged, u_D=math.nan), far, open_)]
+    assert told[0] == "agrees" and told[1] == told[2] == "flagged !" and not any("!" in word for word in told[3:])
 
 
 def test_a_difference_is_a_share_of_its_recorded_value_and_near_zero_thrust_no_thousand_percent() -> None:

@@ -9,7 +9,7 @@ import os
 import re
 import zipfile
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import IO, Any
 from xml.parsers import expat
@@ -243,24 +243,84 @@ def _workbook(raw: bytes, name: str, most: int | None) -> bytes:
         sheets = {title: _csv(book.get_sheet_by_name(title).iter_rows(), name, most) for title in wanted}
     except (CalamineError, zipfile.BadZipFile, OSError) as error:
         raise InputError(_damaged(name, error)) from error
-    tables = [title for title, (_, is_table) in sheets.items() if is_table]
-    tables = tables or [title for title, (text, _) in sheets.items() if text.count("\n") > 1]  # numbers typed as text
-    return sheets[_chosen(name, tables, list(sheets), "sheets")][0].encode()[:most]
+    tables = [title for title, sheet in sheets.items() if sheet.is_table]
+    tables = tables or [title for title, sheet in sheets.items() if sheet.text.count("\n") > 1]  # numbers typed as text
+    title = _chosen(name, tables, list(sheets), "sheets")
+    if most is None and (cell := sheets[title].doubt):
+        hint = "Thousands or decimals? Turn the column into numbers in the spreadsheet"
+        where = f"sheet {title!r}, cell {cell[0]}"
+        raise InputError(Fault(part_of(name)[0], where, f"{cell[1]!r} as text", "a number", hint))
+    return sheets[title].text.encode()[:most]
 
 
-def _csv(rows: Iterator[list[Any]], name: str, most: int | None) -> tuple[str, bool]:
-    """Rows as text, and whether two of them or more have two numbers: a table."""
+_COMMA = re.compile(r"[+-]?(\d+|[1-9]\d{0,2}(\.\d{3})+),\d+([eE][+-]?\d+)?")
+_POINTS = re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3})+,\d+|[+-]?[1-9]\d{0,2}(\.\d{3}){2,}")
+_GROUPS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+\.\d*|[+-]?[1-9]\d{0,2}(,\d{3}){2,}")
+_ONE_GROUP = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
+"""Digits that are thousands or decimals, by the country."""
+
+
+@dataclass(frozen=True)
+class _Sheet:
+    text: str  # as comma-separated values
+    is_table: bool  # whether two rows or more have two numbers
+    doubt: tuple[str, str] | None = None  # place, as B2, and text of a cell that may be either of two numbers
+
+
+def _csv(rows: Iterator[list[Any]], name: str, most: int | None) -> _Sheet:
+    """Cells as text; numbers that a workbook has as text keep no mark but the point."""
     out, numbers = io.StringIO(), 0
     writer = csv.writer(out, lineterminator="\n")
-    for row in rows:
-        numbers += sum(isinstance(cell, float) for cell in row) > 1
+    typed: dict[tuple[int, int], str] = {}
+    for at, row in enumerate(rows):
+        count = sum(isinstance(cell, float) for cell in row)
+        numbers += count > 1
         writer.writerow(map(_cell, row))
+        if count:
+            texts = ((k, cell.strip()) for k, cell in enumerate(row) if isinstance(cell, str))
+            typed |= {(at, k): cell for k, cell in texts if "," in cell or _ONE_GROUP.fullmatch(cell)}
         if out.tell() > (MAX_BYTES if most is None else most):
             if most is None:
                 raise InputError(_too_large(name, f"more than {MAX_BYTES} bytes of cells"))
             if numbers >= _FEWEST_ROWS:
                 break
-    return out.getvalue(), numbers >= _FEWEST_ROWS
+    text, doubt = _with_points(out.getvalue(), typed)
+    return _Sheet(text, numbers >= _FEWEST_ROWS, doubt)
+
+
+def _with_points(text: str, typed: Mapping[tuple[int, int], str]) -> tuple[str, tuple[str, str] | None]:
+    """Comma-separated values whose cells of text have a point for a decimal comma; place and text of one in doubt.
+
+    `typed`: cells of text beside numbers, by row and column. A spreadsheet keeps a number without a mark, so such a
+    cell was typed or pasted in the manner of another country.
+    """
+    commas = {at: cell for at, cell in typed.items() if _COMMA.fullmatch(cell)}
+    if not commas or any(map(_GROUPS.fullmatch, typed.values())):
+        return text, None
+    known = "," * any(not _ONE_GROUP.fullmatch(cell) for cell in commas.values())
+    known += "." * any(map(_POINTS.fullmatch, typed.values()))
+    columns = {k for _, k in commas}
+    of_group = {at: cell for at, cell in typed.items() if at[1] in columns and _ONE_GROUP.fullmatch(cell)}
+    doubt = next((at for at, cell in of_group.items() if not any(mark in cell for mark in known)), None)
+    if doubt:
+        return text, (f"{_letters(doubt[1])}{doubt[0] + 1}", typed[doubt])
+    typed = commas | of_group
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    for i, cells in enumerate(csv.reader(io.StringIO(text))):
+        plain = (cell.replace(".", "").replace(",", ".") if (i, k) in typed else cell for k, cell in enumerate(cells))
+        writer.writerow(plain)
+    return out.getvalue(), None
+
+
+def _letters(column: int) -> str:
+    """Name of a column from 0.
+
+    >>> _letters(0), _letters(25), _letters(26)
+    ('A', 'Z', 'AA')
+    """
+    head, last = divmod(column, 26)
+    return (_letters(head - 1) if head else "") + chr(65 + last)
 
 
 def _cell(value: Any) -> str:

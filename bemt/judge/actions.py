@@ -30,7 +30,8 @@ __all__ = ["calibrate_rotor", "compare", "diagnose", "plan", "prove"]
 @action(
     "Recordings", "diagnose log.csv --case cases/prop_8x5", words=("recordings",), shown=True,
     common=("case", "reference", "ruled_out", "changed", "only", "rpm", "airspeed_m_s", "out"),
-    elsewhere=dict.fromkeys(("--air", "--air-a", "--air-b"), "State --density-kg-m3 1.19, or [air] in the case."),
+    elsewhere=dict.fromkeys(("--air", "--air-a", "--air-b", "--temperature-C", "--pressure-hPa"), (
+        "State --density-kg-m3 1.19, or temperature_C and pressure_hPa in [air] of the case or of a recording.toml.")),
 )  # fmt: skip
 def diagnose(
     recordings: Recording | Sequence[Recording], case: Propeller | Path | Sequence[Propeller | Path], *,
@@ -40,8 +41,8 @@ def diagnose(
     rpm: ArrayLike = (), airspeed_m_s: ArrayLike = (), density_kg_m3: ArrayLike = (),
     repeatability_pct: float | None = None, top_rpm: float | None = None,
     unit: Mapping[str, str] = {}, column: Mapping[str, str] = {}, sign: Mapping[str, str] = {},  # noqa: B006
-    zones: Sequence[str] = (), along: Path | None = None, out: Path | None = None, figures: bool = True,
-    progress: Callable[[str], None] | None = None,
+    pole_pairs: Count | None = None, zones: Sequence[str] = (), along: Path | None = None, out: Path | None = None,
+    figures: bool = True, progress: Callable[[str], None] | None = None,
 ) -> Answer | OnePoint:  # fmt: skip
     """Say which physics or stand fault explains why a recording differs from the model.
 
@@ -79,6 +80,8 @@ def diagnose(
         Fastest that the stand may run: no run beyond it is asked for. [rev/min]
     unit, column, sign : mapping
         What the headings of every table, or the exports of a CFD run, do not say: thrust=N, thrust=fz, torque=-1.
+    pole_pairs : int, optional
+        Of the motor, where the speed of every table counts electrical revolutions; 14 magnets are 7 pairs.
     zones : sequence of str
         Runs of CFD: zones whose loads count.
     along : path, optional
@@ -118,7 +121,8 @@ def diagnose(
         recordings, case, reference, reference_case, only=only, ruled_out=ruled_out, changed=changed, off=off,
         baseline=baseline, channels=channels, rpm=rpm, airspeed_m_s=airspeed_m_s, density_kg_m3=density_kg_m3,
         repeatability_pct=repeatability_pct, top_rpm=top_rpm, along=along, out=out, figures=figures, progress=progress,
-        run={"unit": words(unit), "column": words(column), "sign": words(sign), "zones": list(zones)},
+        run={"unit": words(unit), "column": words(column), "sign": words(sign), "pole_pairs": pole_pairs,
+             "zones": list(zones)},
     )  # fmt: skip
 
 
@@ -131,8 +135,9 @@ def compare(
     a: Recording, b: Recording | None = None, *, case: Propeller | Path | None = None, label: str | None = None,
     diameter_m: float | None = None, rows_a: Sequence[str] = (), rows_b: Sequence[str] = (), air_a: str | None = None,
     air_b: str | None = None, rpm: float | None = None, unit: Mapping[str, str] = {},  # noqa: B006
-    column: Mapping[str, str] = {}, sign: Mapping[str, str] = {}, zones: Sequence[str] = (),  # noqa: B006
-    out: Path | None = None, figures: bool = True, progress: Callable[[str], None] | None = None,
+    column: Mapping[str, str] = {}, sign: Mapping[str, str] = {}, pole_pairs: Count | None = None,  # noqa: B006
+    zones: Sequence[str] = (), out: Path | None = None, figures: bool = True,
+    progress: Callable[[str], None] | None = None,
 ) -> Contrast | Told:  # fmt: skip
     r"""Say what changed between two recordings, or compare one CFD run with BEMT.
 
@@ -157,6 +162,8 @@ def compare(
         One file beside the case: its speed, where no file states it. [rev/min]
     unit, column, sign : mapping
         What the headings of both tables, or the exports of one CFD run, do not say: thrust=N, thrust=fz, torque=-1.
+    pole_pairs : int, optional
+        Of the motor, where the speed of both tables counts electrical revolutions; 14 magnets are 7 pairs.
     zones : sequence of str
         One CFD run: zones whose loads count.
     out : path, optional
@@ -202,7 +209,8 @@ def compare(
     return contrast.compared(
         one, two, case, label=label, diameter_m=diameter_m, rows_a=rows_a, rows_b=rows_b, air_a=air_a, air_b=air_b,
         out=None if out is None else path_text("out", out), figures=figures, progress=progress,
-        run={"rpm": rpm, "unit": words(unit), "column": words(column), "sign": words(sign), "zones": list(zones)},
+        run={"rpm": rpm, "unit": words(unit), "column": words(column), "sign": words(sign), "pole_pairs": pole_pairs,
+             "zones": list(zones)},
     )  # fmt: skip
 
 

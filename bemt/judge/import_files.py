@@ -153,7 +153,8 @@ def import_(
             stated |= {n: cfd_options.filled(one, **of_tables) for n, one in read.items()}
     speed = None if choice.period is None else 60.0 / choice.period
     made = cfd_options.run_from(names, rpm=speed, revolutions=revolutions, **(run | told), ignore=left)
-    found = load.import_files(names, format, choice, made, insist, stated)
+    rotor = None if case is None else _rotor(case)
+    found = load.import_files(names, format, choice, made, insist, stated, rotor)
     if out is not None and found.runs:
         own = made.run.model_copy(update={"files": found.runs[-1].files})
         made = made.model_copy(update={"run": own})
@@ -179,6 +180,14 @@ def words(given: Mapping[str, str] | Sequence[str]) -> list[str]:
     if not isinstance(given, Mapping):
         return [given] if isinstance(given, str) else list(given)
     return [f"{name}={value}" if name else str(value) for name, value in given.items()]
+
+
+def _rotor(case: Propeller | File) -> tuple[float, float]:
+    """Diameter [m] and density [kg/m3] of a case."""
+    from bemt.rotors.propeller import rotor_of
+
+    made = rotor_of(case).case
+    return made.diameter_m, float(made.air().rho)
 
 
 def _beside(

@@ -43,6 +43,7 @@ from bemt.data.readers.split import (
     SplitTable,
     column_numbers,
     decimal_mark,
+    lone_points,
     odd_mark,
     some,
     split_table,
@@ -196,6 +197,11 @@ class Builder:
             return ""
         if self.decimal == "." and self._has_commas(index, label, bad):
             return ""
+        if self.decimal == "," and isinstance(self.table, SplitTable):
+            for i in lone_points(self.table.cells(index))[:1]:
+                got = f"{self.table.cell(i, index)!r} among the decimal commas of {label!r}"
+                hint = "Thousands or decimals? Write it with a comma, or without a mark"
+                self.fault(f"{self.line(i)}:{index + 1}", got, "one decimal mark", hint)
         if bad and (stated := self._one_unit(index, bad)):
             values, bad, _ = column_numbers(
                 [(with_unit(c) or (c, ""))[0] for c in self.table.cells(index)], self.decimal

@@ -1,8 +1,9 @@
 r"""Loads along the blade, as a table of slices: radius, thrust and torque per radius of all blades together.
 
 Headings state their units, by the vocabulary of any recording: ``r [mm],dT/dr [N/m],dQ/dr [N m/m]``,
-``radius_mm,thrust_per_radius_N_m,torque_per_radius_Nm_m``. A column ``run`` (or ``case``) keeps several runs apart;
-rpm, airspeed and density of the slices may stand beside them, as in any table.
+``radius_mm,thrust_per_radius_N_m,torque_per_radius_Nm_m``; the radius may be ``r/R``. A column ``run`` (or ``case``)
+keeps several runs apart; rpm, airspeed and density of the slices may stand beside them, as in any table. An XY plot of
+Fluent is such a table where its labels and the keys of its curves are such headings, over the same radii.
 """
 
 from __future__ import annotations
@@ -10,20 +11,22 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bemt.base import units
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, refuse
-from bemt.data.readers import Reader, head_text, load_text, number
+from bemt.data.readers import Reader, SourceText, head_text, load_text, number
 from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.headings import channel_of, heading
 from bemt.data.readers.split import decimal_mark, some, split_table
 
 LOADS = {"thrust": "force", "torque": "torque"}
 _RADIUS = re.compile(r"r|rad|radius|radial[_ ](position|coordinate|distance)|position\[r\]", re.IGNORECASE)
+_OVER_R = re.compile(r"r ?/ ?R(_?tip)?|r_over_R(_?tip)?")
+_CURVE = re.compile(r'\(\(xy/key/label "(.*)"\)')
 _PER = re.compile(
     r"d(?P<letter>[TFQM])[ _]?[/_]?[ _]?dr|(?P<words>[a-z]+(?:[_ ]force)?)[_ ](?:per|over|/)[_ ](?:unit[_ ])?"
     r"(?:radius|length|span|metre|meter|m|r)",
@@ -36,12 +39,16 @@ _EXAMPLE = "r [m], dT/dr [N/m], dQ/dr [N m/m]: loads of all blades together"
 
 @dataclass(frozen=True, eq=False)
 class Slices:
-    """Slices of one run: radius [m], thrust [N/m] and torque [N m/m] per radius, (N,) each, and what they state."""
+    """Slices of one run: radius [m], thrust [N/m] and torque [N m/m] per radius, (N,) each, and what they state.
+
+    The radius is over that of the tip [1] where ``over_R``; the loads are per metre all the same.
+    """
 
     r: Array
     thrust: Array
     torque: Array
     stated: Mapping[str, float]  # rpm, airspeed_m_s, density_kg_m3, as far as columns have them
+    over_R: bool = False
 
 
 def slice_heading(text: str) -> tuple[str, float] | str:
@@ -55,9 +62,13 @@ def slice_heading(text: str) -> tuple[str, float] | str:
     (('r', 1.0), ('thrust', 1.0))
     >>> slice_heading("dT/dr"), slice_heading("dT/dr [N]")
     ('no unit', "'N' is no force per length")
+    >>> slice_heading("r/R"), slice_heading("r_over_R [-]")
+    (('r/R', 1.0), ('r/R', 1.0))
     """
     found = _UNIT.fullmatch(text.strip())
     base, stated = (found[1], found[2].strip()) if found else (text.strip(), "")
+    if _OVER_R.fullmatch(base) and stated in ("", "-", "1"):
+        return "r/R", 1.0
     if (per := _PER.match(base)) and (found or base[per.end() :].startswith("_") or per.end() == len(base)):
         quantity = _LETTER.get((per["letter"] or "").lower()) or channel_of(per["words"] or "").lower()
         quantity = {"force": "thrust", "lift": "thrust", "moment": "torque"}.get(quantity, quantity)
@@ -87,7 +98,8 @@ def sniff(head: bytes | str) -> bool:
     cells = [c.strip(' "') for c in re.split(r"[;\t,]", next(lines, ""))]
     known = {c for c in map(slice_heading, cells) if c}
     section = {"cl", "cd"} <= {c.lower() for c in cells}
-    return any(k[0] == "r" for k in known if isinstance(k, tuple)) and (len(known) > 1 or section)
+    at = {k[0] for k in known if isinstance(k, tuple)}
+    return bool(at & {"r", "r/R"}) and bool(at & {*LOADS}) or "r" in at and (len(known) > 1 or section)
 
 
 def _per_length(dimension: str, text: str) -> float:
@@ -103,7 +115,7 @@ def _per_length(dimension: str, text: str) -> float:
 def read(path: str | os.PathLike[str]) -> dict[str, Slices]:
     """Slices of each run in a table; one without a column ``run`` is one run, named "slices"."""
     name = os.fspath(path)
-    table = split_table(load_text(path))
+    table = split_table(_as_table(load_text(path)))
     comma = decimal_mark(table) == ","
     heads = [h.strip() for h in table.headings]
     faults: list[Fault] = []
@@ -114,6 +126,9 @@ def read(path: str | os.PathLike[str]) -> dict[str, Slices]:
             at.setdefault(meant[0], (k, meant[1]))
         elif meant:
             faults.append(Fault(name, h, meant, "a unit", f"As in {_EXAMPLE}"))
+    if over := "r" not in at and "r/R" in at:
+        at["r"] = at["r/R"]
+    at.pop("r/R", None)
     if not faults and (missing := [q for q in ("r", *LOADS) if q not in at]):
         words = {"r": "radius", "thrust": "thrust_per_radius_N_m", "torque": "torque_per_radius_Nm_m"}
         got = f"columns {some(heads, 8)}: no {', '.join(words[q] for q in missing)}"
@@ -137,10 +152,31 @@ def read(path: str | os.PathLike[str]) -> dict[str, Slices]:
     if not rows:
         faults.append(Fault(name, "", "no rows", "one slice a row"))
     refuse(faults)
-    return {run: _slices(name, run, [*wanted], np.array(body).T) for run, body in rows.items()}
+    return {run: _slices(name, run, [*wanted], np.array(body).T, over) for run, body in rows.items()}
 
 
-def _slices(file: str, run: str, names: list[str], values: Array) -> Slices:
+def _as_table(source: SourceText) -> SourceText:
+    """An XY plot of Fluent as a table, a column for each curve; any other text as it is."""
+    labels = re.search(r'\(labels "(.*?)" "(.*?)"\)', source.text)
+    curves: dict[str, list[list[str]]] = {}
+    for line in source.lines if labels else ():
+        if key := _CURVE.match(line.strip()):
+            curves[key[1]] = []
+        elif curves and len(cells := line.split()) == 2:
+            curves[[*curves][-1]].append(cells)
+    if not labels or not curves:
+        return source
+    radii = [[x for x, _ in rows] for rows in curves.values()]
+    known = [c for c in curves if isinstance(meant := slice_heading(c), tuple) and meant[0] in LOADS]
+    if len(known) < len(curves) or radii.count(radii[0]) < len(radii):
+        got = f"a Fluent XY plot of {labels[2]!r} over {labels[1]!r}, curves {some(map(repr, curves), 4)}"
+        hint = "One table with both loads at the same radii; Fluent takes such labels of axes and curves"
+        raise InputError(Fault(source.name, "", got, _EXAMPLE, hint))
+    rows = zip(radii[0], *([y for _, y in rows] for rows in curves.values()), strict=True)
+    return replace(source, text="\n".join("\t".join(row) for row in ((labels[1], *curves), *rows)) + "\n")
+
+
+def _slices(file: str, run: str, names: list[str], values: Array, over_R: bool) -> Slices:
     """One run, by radius."""
     v = dict(zip(names, values[:, np.argsort(values[names.index("r")], kind="stable")], strict=True))
     stated = {}
@@ -149,7 +185,7 @@ def _slices(file: str, run: str, names: list[str], values: Array) -> Slices:
             got = f"{', '.join(f'{x:g}' for x in np.unique(v[key])[:4])} in run {run}"
             raise InputError(Fault(file, key, got, "one value in each run", "A column run keeps the runs apart"))
         stated[key] = float(v[key][0])
-    return Slices(v["r"], v["thrust"], v["torque"], stated)
+    return Slices(v["r"], v["thrust"], v["torque"], stated, over_R)
 
 
 READERS = (Reader("slices", sniff, read),)

@@ -36,6 +36,7 @@ _COMMA = re.compile(r"[+-]?(0|[1-9]\d{0,8}),\d+([eE][+-]?\d+)?")
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 _GROUPED = re.compile(r"[+-]?\d{1,3}(?:([,. '\u2019\u00a0\u202f])\d{3})(?:\1\d{3})*(?:[.,]\d+)?")
 """Digits in groups of three."""
+_ONE_POINT = re.compile(r"[+-]?\d{1,3}\.\d{3}")
 _SUMMARY = re.compile(
     r"(mean|average|avg\.?|max(imum)?|min(imum)?|total|sum|std\.?( ?dev\.?)?|median|mittelwert|durchschnitt|summe"
     r"|moyenne|moy\.?|promedio|media|prom\.?|massimo|minimo|\u5e73\u5747\u503c?|\u6700\u5927\u503c?|\u6700\u5c0f\u503c?)\W*",
@@ -117,6 +118,17 @@ def _ungrouped(cell: str, decimal: str) -> float | None:
     bare = cell.replace(grouped[1], "")
     alone = grouped[1] in ",." and bare.lstrip("+-").isdigit() and cell.count(grouped[1]) == 1
     return None if alone and decimal == "." else number(bare.replace(",", "."))
+
+
+def lone_points(cells: Sequence[str]) -> list[int]:
+    """Rows of a column with decimal commas whose cell may be thousands, or a decimal point: 5.910 beside 6,669.
+
+    >>> lone_points(["2,085", "5.910"]), lone_points(["985,5", "1.234,5", "2.000"]), lone_points(["4.000", "5.910"])
+    ([1], [], [])
+    """
+    if any("." in cell and _GROUPED.fullmatch(cell) and not _ONE_POINT.fullmatch(cell) for cell in cells):
+        return []  # points between thousands are usual in it
+    return [i for i, cell in enumerate(cells) if _ONE_POINT.fullmatch(cell)] if any("," in c for c in cells) else []
 
 
 def split_line(line: str, mark: str) -> list[str]:

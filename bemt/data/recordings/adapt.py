@@ -34,9 +34,12 @@ def is_recording(record: Dataset, adapted: bool) -> bool:
     return "rpm" in known and bool({"thrust_N", "torque_Nm", "power_W"} & known)
 
 
-def findings(record: Dataset) -> tuple[Finding, ...]:
-    """Faults of a recording."""
-    return check(record) if record.kind in ("bench", "table") else ()
+def findings(
+    record: Dataset, diameter_m: float | None = None, density_kg_m3: float | None = None
+) -> tuple[Finding, ...]:
+    """Faults of a recording, of a rotor as far as it is known."""
+    measured = record.kind in ("bench", "table")
+    return check(record, diameter_m=diameter_m, density_kg_m3=density_kg_m3) if measured else ()
 
 
 def reduction_of(record: Dataset) -> Dataset | str:
@@ -140,12 +143,17 @@ def _references(found: list[Reference], form: str, name: str) -> Dataset:
 def _along(found: Mapping[str, Slices], form: str, name: str) -> Dataset:
     """Loads along the blade, a run after the other, with their sums."""
     notes = [f"{run}: {np.trapezoid(s.thrust, s.r):.4g} N and {np.trapezoid(s.torque, s.r):.4g} N m between the radii "
-             f"{s.r[0]:.4g} and {s.r[-1]:.4g} m" for run, s in found.items()]  # fmt: skip
+             f"{s.r[0]:.4g} and {s.r[-1]:.4g} m" for run, s in found.items() if not s.over_R]  # fmt: skip
     command = f"`bemt diagnose RECORDING --case CASE --along {name}`"
     notes.append(f"taken for loads of all blades; {command} sets them beside BEMT")
-    columns = {"r_m": "r", "thrust_per_radius_N_m": "thrust", "torque_per_radius_Nm_m": "torque"}
+    over = any(s.over_R for s in found.values())
+    columns = {
+        "r_over_R" if over else "r_m": "r",
+        "thrust_per_radius_N_m": "thrust",
+        "torque_per_radius_Nm_m": "torque",
+    }
     channels = {k: Channel(np.concatenate([getattr(s, a) for s in found.values()]), k.split("_", 3)[-1] if a != "r"
-                           else "m") for k, a in columns.items()}  # fmt: skip
+                           else "-" if over else "m") for k, a in columns.items()}  # fmt: skip
     return dataset(form, "table", channels, notes, {"file": name})
 
 

@@ -354,7 +354,8 @@ class _Measured:
                 yield Fault("", "--column", f"no column for {quantity}", expected)
                 return
             facts["column"] = named[0]
-        found, dimension = heading(str(facts["column"])).unit, CHANNELS[quantity]
+        text, dimension = str(facts["column"]), CHANNELS[quantity]
+        found = heading(text).unit or heading(re.sub(r"^[^(\[]*", f"{quantity} ", text)).unit
         if "unit" not in facts:
             if found is None or found.suffix not in units.UNITS or found.dimension != dimension:
                 expected = f"--unit {quantity}= {' or '.join(units.suffixes(dimension))}"
@@ -430,7 +431,10 @@ def recording_from(
     return document
 
 
-def stated_frame(frame: Any, unit: Iterable[str] = (), column: Iterable[str] = (), sign: Sequence[str] = ()) -> Any:
+def stated_frame(
+    frame: Any, unit: Iterable[str] = (), column: Iterable[str] = (), sign: Sequence[str] = (),
+    pole_pairs: int | None = None,
+) -> Any:  # fmt: skip
     """A DataFrame with what is said of its columns in their names, as `from_pandas` reads them.
 
     >>> import pandas as pd
@@ -441,10 +445,14 @@ def stated_frame(frame: Any, unit: Iterable[str] = (), column: Iterable[str] = (
     bemt.base.errors.InputError: --unit: got no unit for rpm; expected --unit rpm=...
     >>> stated_frame(pd.DataFrame({"rpm": [6000.0], "F": [2.0]}), ["F=gf"], ["thrust=F"], ["thrust=-1"]).to_dict("list")
     {'rpm': [6000.0], 'thrust_gf': [-2.0]}
+    >>> stated_frame(pd.DataFrame({"eRPM": [42000.0]}), pole_pairs=7).to_dict("list")
+    {'rpm': [6000.0]}
     """
     faults: list[Fault] = []
     headings = _Measured([str(h) for h in frame.columns])
     columns = _facts(headings, unit, column, sign, faults)
+    if pole_pairs:
+        columns |= {} if "electrical_rpm" in columns else headings.electrical(columns.pop("rpm", {}))
     for quantity, facts in columns.items():
         faults += headings.complete(quantity, facts)
     refuse(faults)
@@ -452,6 +460,9 @@ def stated_frame(frame: Any, unit: Iterable[str] = (), column: Iterable[str] = (
     for quantity, facts in columns.items():
         own, told = facts["column"], units.UNITS[str(facts["unit"])]
         turning = CHANNELS[quantity] == "angular_speed"
+        if quantity == "electrical_rpm" and pole_pairs:
+            out[own] = out[own] / pole_pairs
+            quantity = "rpm" if own == "rpm" or "rpm" not in out else "rpm_from_electrical_rpm"
         factor = float(facts.get("sign", 1)) * (told.factor / units.RPM if turning else 1.0)
         out[own] = out[own] * factor
         out = out.rename(columns={own: quantity if turning else f"{quantity}_{told.suffix}"})

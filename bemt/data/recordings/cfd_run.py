@@ -438,16 +438,28 @@ def _dataset(work: OpenRun, points: _Points, read: Sequence[tuple[str, Dataset]]
         note = f"{number_of((~keep).sum(), 'point')} without a load left out"
         made = replace(made.select(keep), notes=(*made.notes, note))
         each = None if each is None else np.broadcast_to(each, (rows,))[keep]
-    # what lies elsewhere is no slip of a unit
-    found = () if work.elsewhere else check(made, ducted="duct_thrust_N" in full)
-    fluid = "" if "density_kg_m3" in full else "density, not stated and taken for that of air (--density-kg-m3), or "
-    slips = (f"{f.evidence}. Suggestion: {fluid}{f.correction}" for f in found if f.severity != "note")
-    made = replace(made, notes=(*slips, *made.notes))
+    made = replace(made, notes=(*_slips(made), *made.notes))
     if each is not None and np.unique(each).size > 1:
         return by_grid(made, each, None if "cells" in values else work.size_unit)
     u = _stated_grid(work)
     told = ", ".join(f"{k.split('_')[0]} {u[k]:.2%}" for k in ("thrust_N", "torque_Nm") if k in u)
     return with_grid_floor(made, u, (f"u of the grid: {told}, as stated",) if u else ())
+
+
+def _slips(run: CfdRun, diameter_m: float | None = None, density_kg_m3: float | None = None) -> tuple[str, ...]:
+    """Slips of a unit that the loads of a run show; what lies elsewhere is none."""
+    of_case = {"diameter_m": diameter_m, "density_kg_m3": density_kg_m3}
+    found = () if run.elsewhere else check(run, ducted="duct_thrust_N" in run, **of_case)
+    open_ = density_kg_m3 is None and "density_kg_m3" not in run
+    fluid = "density, not stated and taken for that of air (--density-kg-m3), or " if open_ else ""
+    return tuple(f"{f.evidence}. Suggestion: {fluid}{f.correction}" for f in found if f.severity != "note")
+
+
+def of_rotor(run: CfdRun, diameter_m: float, density_kg_m3: float) -> CfdRun:
+    """A run of a rotor that is known, in air or water of its case: no slip is seen by a diameter that was guessed."""
+    guessed = set(_slips(run))
+    said = _slips(run, diameter_m, density_kg_m3)
+    return replace(run, notes=(*said, *(note for note in run.notes if note not in guessed)))
 
 
 _SHOWN = {"rpm": "rev/min", "airspeed_m_s": "V [m/s]", "J": "J", "thrust_N": "thrust [N]",

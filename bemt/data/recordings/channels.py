@@ -7,6 +7,7 @@ entry of `dropped`.
 
 from __future__ import annotations
 
+import difflib
 import re
 import shlex
 from collections.abc import Mapping
@@ -18,7 +19,7 @@ from numpy.typing import ArrayLike
 from bemt.base import units
 from bemt.base.arrays import Array
 from bemt.base.tables import number_of
-from bemt.data.readers.headings import USUAL, counts_electrical, unit_alone
+from bemt.data.readers.headings import USUAL, counts_electrical, may_be_shaft_speed, meanings, unit_alone
 from bemt.data.readers.recording import FULL_THROTTLE
 from bemt.physics.dataset import Dataset
 
@@ -121,13 +122,39 @@ def in_one_step(d: Dataset) -> str:
 
 
 def asks(d: Dataset) -> dict[str, tuple[str, str, str]]:
-    """Quantities that no heading names and a column may be: its channel, why it may, and the option that says so."""
+    """Quantities that no heading names and a column may be: its channel, why it may, and the option that says so.
+
+    >>> read = Dataset("bench", "table", {"Thurst_g": [1.0, 2.0]}, units={"Thurst_g": ""})
+    >>> asks(replace(read, provenance={"headings": {"Thurst_g": "Thurst (g)"}}))["thrust"][2]
+    "is it the thrust? --column thrust='Thurst (g)'"
+    """
     seen, out = named(d).values, {}
+    for quantity, name in misspelt(d).items():
+        text = d.headings.get(name) or name
+        option = f"--column {quantity}={shlex.quote(text)}"
+        out[quantity] = name, f"not read, and no {quantity} is known", f"is it the {quantity}? {option}"
     for quantity, name in d.provenance.get("asked", {}).items():
         if name in d.values and not any(k.startswith(f"{quantity}_") for k in seen):
             unit = d.unit(name).replace("_", "/")
             option = f"--column {quantity}={shlex.quote(d.headings.get(name) or name)}"
             out[quantity] = name, f"in {unit}, and no {quantity} is known", f"is it the {quantity}? {option}"
+    return out
+
+
+NEAR = 0.65
+"""Likeness of two words, as `difflib` counts it, from which one may be the other misspelt (RMP and rpm). [1]"""
+
+
+def misspelt(d: Dataset) -> dict[str, str]:
+    """Quantities that no heading names, and the channel whose heading is nearest to the name."""
+    seen, out = names_of(rec := named(d)), {}
+    unread = {k: d.headings.get(k) or k for k, v in d.values.items() if k not in {*seen.values(), *rec.values}}
+    words = {k: re.split(r"[\s_(\[]", text.strip().lower())[0] for k, text in unread.items()}
+    words = {k: word for k, word in words.items() if not meanings(word) and not may_be_shaft_speed(unread[k])}
+    for quantity in ("rpm", "thrust", "torque"):
+        known = any(k == quantity or k.startswith(f"{quantity}_") for k in rec.values)
+        if not known and (near := difflib.get_close_matches(quantity, words.values(), 1, NEAR)):
+            out[quantity] = next(k for k, word in words.items() if word == near[0])
     return out
 
 

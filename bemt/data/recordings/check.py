@@ -27,16 +27,17 @@ OPEN_OR_OUT = (*LEFT_OUT, "unnamed_column")
 
 @np.errstate(all="ignore")  # a damaged file may hold any number
 def check(
-    source: Dataset, *, diameter_m: float | None = None, pitch_m: float | None = None, ducted: bool = False
-) -> tuple[Finding, ...]:
-    """Look for faults in a recording.
+    source: Dataset, *, diameter_m: float | None = None, pitch_m: float | None = None, ducted: bool = False,
+    density_kg_m3: float | None = None,
+) -> tuple[Finding, ...]:  # fmt: skip
+    """Look for faults in a recording of a rotor, in air or water of a density where it states none.
 
     >>> rpm = [4000.0, 5000.0, 6000.0, 7000.0]
     >>> stand = Dataset("bench", "stand", {"rpm": rpm, "thrust_N": [0.22, 0.34, 0.50, 0.68]})  # kgf, not N
     >>> [(f.id, f.correction.split(".")[0]) for f in check(stand, diameter_m=0.254)]
     [('thrust_unit', 'thrust_N: kgf taken for N: multiply by 9')]
     """
-    facts = facts_of(source, diameter_m, pitch_m, ducted)
+    facts = facts_of(source, diameter_m, pitch_m, ducted, density_kg_m3)
     # what a computation holds constant, somebody has set
     checks = (run for name, run in CHECKS.items() if (source.kind, name) != ("cfd", "constant"))
     found = [finding for run in checks for finding in run(facts)]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.data.recordings.channels import asks, named, names_of
+from bemt.physics.air import LIQUID
 from bemt.physics.dataset import Dataset
 
 SEVERITIES = ("error", "warning", "note")
@@ -61,6 +62,7 @@ class Facts:
     # As far as known [m]
     diameter_m: float | None = None
     pitch_m: float | None = None
+    density_kg_m3: float | None = None  # Of the case
     ducted: bool = False  # Rotor in a duct
     bare: bool = False  # Recorded without a propeller: nothing is expected of its loads
     settled: bool = False  # Rows are means of computed flows: one is enough
@@ -88,9 +90,10 @@ class Facts:
 
     @property
     def rho(self) -> Array:
-        """Density, a usual one where none is recorded. [kg/m3]"""
+        """Density; where none is recorded that of the case, else a usual one. [kg/m3]"""
         v = self.values.get("density_kg_m3", np.full(len(self), np.nan))
-        return np.where((v > 0.2) & (v < 2.0), v, LIKELY_RHO)
+        known = (v > 0.2) & (v < 2.0) | (v >= LIQUID[0]) & (v <= LIQUID[1])
+        return np.where(known, v, LIKELY_RHO if self.density_kg_m3 is None else self.density_kg_m3)
 
     @property
     def power_by_product(self) -> bool:
@@ -176,7 +179,9 @@ def _without_spikes(rec: Dataset) -> Dataset:
     return replace(rec, values=values)
 
 
-def facts_of(source: Dataset, diameter_m: float | None, pitch_m: float | None, ducted: bool) -> Facts:
+def facts_of(
+    source: Dataset, diameter_m: float | None, pitch_m: float | None, ducted: bool, density_kg_m3: float | None = None
+) -> Facts:
     """Gather the facts of a recording or a series."""
     rec = _without_spikes(named(source))
     raw = {k: np.where(far, np.nan, v) if (far := np.abs(v) > 1e12).any() else v for k, v in source.values.items()}
@@ -184,7 +189,7 @@ def facts_of(source: Dataset, diameter_m: float | None, pitch_m: float | None, d
     return Facts(
         rec.values, raw, {k: source.unit(k) for k in raw}, names_of(rec), rec.lines,
         diameter_m if diameter_m is not None else said.get("diameter_m"),
-        pitch_m if pitch_m is not None else said.get("pitch_m"),
+        pitch_m if pitch_m is not None else said.get("pitch_m"), density_kg_m3,
         ducted or about.get("rotor_ducted") == "yes" or about.get("duct") == "yes", about.get("propeller") == "none",
         source.kind == "cfd", asks(source),
     )  # fmt: skip

@@ -116,8 +116,12 @@ def _unsettled(record: Dataset) -> list[str]:
 def import_files(
     paths: Iterable[str | os.PathLike[str]], format: str | None = None, choice: Choice | None = None,  # noqa: A002
     run: RunToml | None = None, insist: bool = False, stated: Mapping[str, Dataset] = {},  # noqa: B006
+    rotor: tuple[float, float] | None = None,
 ) -> Imported:  # fmt: skip
-    """Read files, those of `stated` as the user states them; with ``insist`` they must be the CFD run of ``run``."""
+    """Read files, those of `stated` as the user states them; with ``insist`` they must be the CFD run of ``run``.
+
+    `rotor`: diameter [m] and density [kg/m3] of the case, as far as it is known.
+    """
     names = [os.fspath(path) for path in paths]
     runs, to_do = runs_of(names, run, insist)
     if runs or to_do:
@@ -136,7 +140,9 @@ def import_files(
         to_do = None
     told = {d.file for d in runs}
     runs = [*runs, *(d for d in records.values() if cfd_run.is_run(d) and d.file not in told)]
-    files = [_file(name, format, records.get(name), errors.get(name)) for name in names]
+    if rotor is not None:
+        runs = [cfd_run.of_rotor(d, *rotor) if cfd_run.is_run(d) else d for d in runs]
+    files = [_file(name, format, records.get(name), errors.get(name), rotor or ()) for name in names]
     return Imported(tuple(files), tuple(d for d in runs if cfd_run.is_run(d)), to_do)
 
 
@@ -150,11 +156,24 @@ def as_stated(files: Sequence[Any], run: Mapping[str, Any]) -> list[Any]:
     from bemt.data.recordings.cfd_options import run_from, stated_frame
 
     if not run.get("zones") and all(hasattr(f, "columns") or is_measured(f) for f in files):
-        told = [run.get(name) or [] for name in ("unit", "column", "sign")]
+        told: list[Any] = [*(run.get(name) or [] for name in ("unit", "column", "sign")), run.get("pole_pairs")]
         if not any(told) and run.get("rpm") is None:
             return list(files)
         return [stated_frame(f, *told) if hasattr(f, "columns") else _stated(f, run.get("rpm"), *told) for f in files]
-    return list(runs_of(files, run_from(list(files), **run), insist=True)[0])
+    of_runs = {k: v for k, v in run.items() if k != "pole_pairs"}
+    if len(of_runs) < len(run) and run["pole_pairs"]:
+        raise InputError(Fault("", "--pole-pairs", f"{run['pole_pairs']} with these files", "tables of measurements"))
+    return list(runs_of(files, run_from(list(files), **of_runs), insist=True)[0])
+
+
+def stated_options(run: Mapping[str, Any]) -> dict[str, Sequence[str]]:
+    """Options of a command that state the columns of tables.
+
+    >>> stated_options({"unit": ["thrust=N"], "pole_pairs": 7, "zones": ["blade"]})
+    {'unit': ['thrust=N'], 'pole-pairs': ['7']}
+    """
+    columns = {name: run[name] for name in ("unit", "column", "sign") if run.get(name)}
+    return columns | ({"pole-pairs": [f"{run['pole_pairs']}"]} if run.get("pole_pairs") else {})
 
 
 def is_measured(file: Any) -> bool:
@@ -163,14 +182,15 @@ def is_measured(file: Any) -> bool:
 
 
 def _stated(
-    file: str, rpm: float | None, unit: Sequence[str], column: Sequence[str], sign: Sequence[str]
+    file: str, rpm: float | None, unit: Sequence[str], column: Sequence[str], sign: Sequence[str],
+    pole_pairs: int | None,
 ) -> Dataset:  # fmt: skip
     """A table of measurements as a recording.toml with these facts would read it."""
     from bemt.data.readers.recording_toml import RecordingToml, joined
     from bemt.data.recordings.cfd_options import filled, recording_from
 
-    if unit or column or sign:
-        made = RecordingToml.model_validate(recording_from(file, unit, column, sign))
+    if unit or column or sign or pole_pairs:
+        made = RecordingToml.model_validate(recording_from(file, unit, column, sign, pole_pairs))
         record = _finished(joined(made, Path(file).parent, file), Choice())
     else:
         record = import_file(file)
@@ -250,14 +270,14 @@ def _refusal(error: Exception) -> str:
 
 
 def _file(
-    name: str, format: str | None, record: Dataset | None, error: str | None  # noqa: A002
+    name: str, format: str | None, record: Dataset | None, error: str | None, rotor: Sequence[float]  # noqa: A002
 ) -> ImportedFile:  # fmt: skip
     if record is None:
         return ImportedFile(name, format, error=error)
     try:
         reduced = _reduced(record)
         found = ImportedFile(name, record.format, record, reduced, _means(record, reduced),
-                             findings(record), record.notes, error)  # fmt: skip
+                             findings(record, *rotor), record.notes, error)  # fmt: skip
         found.document()  # what cannot be shown is refused with its file
     except Exception as failed:
         return ImportedFile(name, format, error=_refusal(failed))
@@ -286,11 +306,14 @@ def check_format(name: str | None) -> None:
         raise InputError(Fault("", "--format", repr(name), f"one of {', '.join(importers.importers())}"))
 
 
-def as_dataset(record: Dataset) -> Dataset:
-    """Points of what was read: steady points of a recording, rows of a table, else one point of means."""
+def as_dataset(record: Dataset, rotor: Sequence[float] = ()) -> Dataset:
+    """Points of what was read: steady points of a recording, rows of a table, else one point of means.
+
+    `rotor`: diameter [m] and density [kg/m3] of the case, where one is known.
+    """
     if cfd_run.is_run(record):
         return record
-    notes = [*record.notes, *(f"{f.severity}: {f.id} in {f.channel}: {f.evidence}" for f in findings(record))]
+    notes = [*record.notes, *(f"{f.severity}: {f.id} in {f.channel}: {f.evidence}" for f in findings(record, *rotor))]
     reduced = _reduced(record)
     if isinstance(reduced, Dataset):
         return replace(reduced, notes=(*reduced.notes, *notes))

@@ -23,9 +23,11 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of
 from bemt.base.units import ZERO_CELSIUS
+from bemt.data.readers.split import some
 from bemt.data.recordings.channels import (
     LOADS,
     DroppedCells,
+    asks,
     dropped,
     file_name,
     in_one_step,
@@ -84,6 +86,9 @@ def reduce(recording: Dataset, *, diameter_m: float | None = None, steady: bool 
     if not set(LOADS) & rec.values.keys():
         got = "no thrust, torque, power, current or coefficient with a unit"
         hint = "Name units in the headings or in a recording.toml" + in_one_step(recording)
+        if near := [fix for q, (_, _, fix) in asks(recording).items() if q in ("thrust", "torque")]:
+            hint = "; ".join([near[0][0].upper() + near[0][1:], *near[1:]])
+        got += f"; columns {some(map(repr, recording.headings.values()), 12)}" * bool(recording.headings)
         if recording.kind == "flight":
             hint = (
                 "Nothing on board weighs the thrust: give a table with thrust_N, mass times acceleration per propeller"

@@ -24,7 +24,7 @@ from bemt.base.document import Documented
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of, number_text, speed_text, text_table
 from bemt.data.recordings.audit import AuditLine, combined
-from bemt.data.recordings.cfd_run import is_run, run_at
+from bemt.data.recordings.cfd_run import is_run, of_rotor, run_at
 from bemt.data.recordings.cfd_setup import (
     Elsewhere,
     audit_of,
@@ -115,8 +115,13 @@ class RunComparison(Documented):
         return {"schema": SCHEMA, "version": __version__, **super().document()}
 
 
-def cfd_points(path: str, read: Dataset | None = None) -> tuple[Dataset, Dataset]:
-    """Points of a CFD recording, and the file as it was `read`: a run, or a table of runs such as a campaign's."""
+def cfd_points(
+    path: str, read: Dataset | None = None, rotor: tuple[float, float] | None = None
+) -> tuple[Dataset, Dataset]:
+    """Points of a CFD recording, and the file as it was `read`: a run, or a table of runs such as a campaign's.
+
+    `rotor`: diameter [m] and density [kg/m3] of the case that it stands beside.
+    """
     from bemt.data.recordings.load import as_dataset, import_file
 
     imported = import_file(path) if read is None else read
@@ -128,8 +133,9 @@ def cfd_points(path: str, read: Dataset | None = None) -> tuple[Dataset, Dataset
             first = Fault(path, "", "exports of CFD, not yet a run", "a run.toml", hint)
             raise InputError([first, *error.faults]) from error
     if is_run(imported):
+        imported = imported if rotor is None else of_rotor(imported, *rotor)
         return imported, imported
-    points = named(as_dataset(imported))
+    points = named(as_dataset(imported, rotor or ()))
     known = points.values.keys() & {"thrust_N", "torque_Nm", "CT", "CQ", "CP"}
     needed = "thrust_N" in points or ("J" not in points and "airspeed_m_s" in points)
     if not known or ("rpm" not in points and needed):
@@ -155,7 +161,7 @@ def compare_run(
     given = path if isinstance(path, Dataset) else None
     name = os.fspath(path) if not isinstance(path, Dataset) else path.file or path.name
     made = rotor_of(case).case
-    points, imported = cfd_points(name, given)
+    points, imported = cfd_points(name, given, (made.diameter_m, float(made.air().rho)))
     notes, points_stated = list(points.notes), {*points.values}
     for channel, words, value in (
         ("rpm", "rev/min", made.rpm),

@@ -238,6 +238,10 @@ def speed_in_doubt(imported: Dataset, path: str) -> None:
         raise InputError(Fault(path, f"column {imported.headings.get(name, name)}", got, "the airspeed", hint))
     if "rpm" in told:
         return
+    if doubt := asks(imported).get("rpm"):
+        name, got, fix = doubt
+        hint = f"{fix[0].upper()}{fix[1:]}; one speed for all rows: --rpm N"
+        raise InputError(Fault(path, f"column {imported.headings.get(name, name)}", got, "the speed of rotation", hint))
     headings = imported.headings
     heading = {name: headings.get(name) or name for name in (*imported.values, *imported.texts)}
     faults = []
@@ -252,7 +256,8 @@ def speed_in_doubt(imported: Dataset, path: str) -> None:
             hint = f"If it is the speed of this rotor, head it rpm, or write in recording.toml: {line}"
             got, expected = f"a speed under a name of its own ({name})", "one column that is the speed of the rotor"
             if counts_electrical(heading[name]):
-                got, hint = "electrical revolutions", "The speed of the rotor is that over the pole pairs"
+                got = "electrical revolutions"
+                hint = "The speed of the rotor is that over the pole pairs: --pole-pairs N in diagnose and compare"
             else:
                 hint += "; electrical_rpm with pole_pairs if it counts electrical revolutions"
             faults.append(Fault(path, f"column {heading[name]}", got, expected, hint))

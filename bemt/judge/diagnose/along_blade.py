@@ -43,6 +43,7 @@ RIGID = ("untwist",)
 class BladeLoads:
     """Thrust and torque per radius of the whole rotor at radii of one run [m], [N/m], [N m/m], and where it ran.
 
+    The radii are over that of the tip [1] where ``over_R``.
     ``u`` holds the standard uncertainty of thrust and torque, the grid's included, as a share [1].
     """
 
@@ -54,6 +55,7 @@ class BladeLoads:
     V: float | None = None
     density: float | None = None
     u: tuple[float, float] = (0.0, 0.0)
+    over_R: bool = False
 
 
 @dataclass(frozen=True)
@@ -130,7 +132,7 @@ def read_blade_loads(path: Path) -> dict[str, BladeLoads]:
 
         rpm, V, density = (s.stated.get(c, of(c)) for c in ("rpm", "airspeed_m_s", "density_kg_m3"))
         thrust, torque = (abs((of(f"u_{c}") or 0.0) / (of(c) or np.inf)) for c in ("thrust_N", "torque_Nm"))
-        return BladeLoads(run, s.r, s.thrust, s.torque, rpm, V, density, (thrust, torque))
+        return BladeLoads(run, s.r, s.thrust, s.torque, rpm, V, density, (thrust, torque), s.over_R)
 
     return {run: made(run, s) for run, s in slices.read(path).items()}
 
@@ -158,6 +160,8 @@ def along(
     model = prepare_case(case)
     out = {}
     for run, loads in read_blade_loads(path).items():
+        if loads.over_R:
+            loads = replace(loads, r=loads.r * model.rotor.R, over_R=False)
         _within(model.rotor.R, loads.r, path, run)
         if np.trapezoid(loads.torque, loads.r) < 0.0:  # its sign is the sense of rotation
             loads = replace(loads, torque=-loads.torque)

@@ -15,7 +15,7 @@ from bemt.base.action import Answered, Told
 from bemt.base.errors import Fault, InputError, refuse, system_fault
 from bemt.base.given import number, path_text
 from bemt.data.recordings.grid_study import together
-from bemt.data.recordings.load import as_stated, import_file
+from bemt.data.recordings.load import as_stated, import_file, stated_options
 from bemt.data.recordings.shown import options_of
 from bemt.judge.compare import one_run
 from bemt.judge.diagnose import figures as pictures
@@ -204,7 +204,7 @@ def diagnosed(
         "zones": run["zones"], "top-rpm": several(top_rpm),
         "baseline": [baseline] * (baseline != "bemt"),
     })  # fmt: skip
-    stated_of = {name: run[name] for name in ("unit", "column", "sign")}
+    stated_of = stated_options(run)
     own, others = (tuple(map(shlex.quote, _named(*f))) for f in ((files, "RECORDING"), (known, "REFERENCE")))
     asked = Given(own, others, of_case, " ".join(rest), tuple(ruled_out), tuple(changed), stated_of)
     heard = [CHANNELS[c] for c in channels] or None

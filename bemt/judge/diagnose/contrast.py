@@ -138,7 +138,7 @@ def compare(
     Loads are compared as load / (rho n^2) on a smooth curve over ln n and V/(n D), by Gaussian processes (Rasmussen and
     Williams 2006, eq. 2.23 to 2.24 and 2.37 to 2.42). Density counts where both recordings tell it.
     """
-    from bemt.data.recordings.load import as_stated, import_file
+    from bemt.data.recordings.load import as_stated, import_file, stated_options
     from bemt.judge.diagnose.load import is_table
     from bemt.physics.dataset import Dataset, from_pandas
 
@@ -147,7 +147,7 @@ def compare(
         names[0], names[1], tuple(rows_a), tuple(rows_b), air_a, air_b, label,
         None if case is None else os.fspath(case) if isinstance(case, str | os.PathLike)
         else rotor_of(case).case.path.as_posix(), diameter_m,
-        {k: v for k, v in (run or {}).items() if k in ("unit", "column", "sign")},
+        stated_options(run or {}),
     )  # fmt: skip
     diameter_m = label_diameter(label) if diameter_m is None else diameter_m
     case = None if case is None else rotor_of(case).case
@@ -172,7 +172,8 @@ def compare(
             read.append(with_air(selected(whole, rows, name), air, option))
     refuse(faults)
     D = case.diameter_m if case is not None and diameter_m is None else diameter_m
-    findings = [_findings(imported, D, case is not None and case.ducted) for imported in read]
+    rho = None if case is None else float(case.air().rho)
+    findings = [_findings(imported, D, case is not None and case.ducted, rho) for imported in read]
     read = [_sound(imported, found) for imported, found in zip(read, findings, strict=True)]
     runs = []
     for name, rows, imported in zip(names, conditions, read, strict=True):
@@ -243,11 +244,14 @@ def _write(out: Path, found: Contrast | Told, figures: bool, files: Sequence[str
         write_atomic(out / f"{FIRST}.png", first_picture(records, cases)[0].png())
 
 
-def _findings(imported: Dataset, diameter_m: float | None, ducted: bool) -> tuple[Finding, ...]:
+def _findings(
+    imported: Dataset, diameter_m: float | None, ducted: bool, density_kg_m3: float | None
+) -> tuple[Finding, ...]:
     """What cannot be so in a recording, what it leaves open or out, as ``import`` and ``diagnose`` find it."""
     from bemt.data.recordings.check import OPEN_OR_OUT, check
 
-    found = check(imported, diameter_m=diameter_m, ducted=ducted) if imported.kind in ("bench", "table") else ()
+    of_rotor = {"diameter_m": diameter_m, "density_kg_m3": density_kg_m3}
+    found = check(imported, ducted=ducted, **of_rotor) if imported.kind in ("bench", "table") else ()
     # a propeller that windmills pulls the other way; signs have a note of their own
     return tuple(f for f in found if (f.severity == "error" or f.id in OPEN_OR_OUT) and f.id != "sign_flipped")
 

@@ -66,7 +66,7 @@ def load(
 ) -> Record:  # fmt: skip
     """Read one recording, whatever its format."""
     from bemt.data.recordings.cfd_options import filled
-    from bemt.data.recordings.cfd_run import is_run, run_at
+    from bemt.data.recordings.cfd_run import is_run, of_rotor, run_at
     from bemt.data.recordings.cfd_setup import one_grid, stated_setup
     from bemt.data.recordings.load import import_file
     from bemt.data.recordings.reduce import reduce, reduction
@@ -82,6 +82,7 @@ def load(
         one_rotor(imported, path, "`compare A B --rows-b rotor={} --case CASE` takes one of them")
     if is_run(imported):
         speed_in_doubt(imported, path)
+        imported = of_rotor(imported, case.diameter_m, float(case.air().rho))
         run, gains = one_grid(imported)
         made = records.from_series(run, case, gains)
         return replace(made, notes=(*made.notes, *imported.notes), computed=True, setup=setup, whole=imported)
@@ -91,7 +92,8 @@ def load(
     _airspeed_in_doubt(imported, case, path)
     _same_rotor(imported, case, path)
     ducted = case.ducted
-    findings = check(imported, diameter_m=case.diameter_m, ducted=ducted)
+    rho = float(case.air().rho)
+    findings = check(imported, diameter_m=case.diameter_m, ducted=ducted, density_kg_m3=rho)
     found = tuple(f"{Path(path).name}: {f}" for f in findings if f.severity != "note")
     imported = left_out(imported, findings)
     rows = named(imported)

@@ -287,8 +287,12 @@ def _slips(problem: Problem, found: dict[str, float]) -> Iterator[_Slip]:
     for m in unit_errors.speed_ratios(rarest=1.0):
         near = all(abs(v + 2.0 * math.log(m.ratio)) < math.log(FACTOR) for v in found.values())
         if near and 1 in (m.true, m.set):
-            kind, true = "poles" if m.set == 1 else "divided twice", RpmScale(factor=m.ratio, eps=0.0)
-            yield from _shapes(problem, found, [(kind, m.words, true, 0.5 + m.rarity)])
+            kind, words = "divided twice", m.words
+            if m.set == 1:  # no model knows its loads to a pair
+                about = f"about {m.true} pole pairs (half the magnets of the motor; --pole-pairs N)"
+                kind, words = "poles", f"{words.partition(':')[0]}: divide by {about}"
+            true = RpmScale(factor=m.ratio, eps=0.0)
+            yield from _shapes(problem, found, [(kind, words, true, 0.5 + m.rarity)])
     for error in unit_errors.errors("rotation"):
         yield "speed", f"rpm: {error.words}", dict.fromkeys(found, -2.0 * math.log(error.factor)), 1.0 + error.rarity
     for channel, kind in ((T, "force"), (Q, "torque")):

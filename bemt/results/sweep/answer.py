@@ -81,10 +81,20 @@ def _compared(result: Result) -> list[_Thrust]:
 
 
 def _agreement(c: Comparison) -> str:
-    """Whether model and recording agree, or how good the recording would have to be; "!" where a flag forbids it."""
+    """Whether model and recording agree, or how good the recording would have to be; "flagged !" where a flag forbids.
+
+    A flag takes nothing from a difference: only what would be called agreement has the mark.
+    """
+    if _forbidden(c):
+        return "flagged !"
     words: dict[State, str] = {"model unknown": "BEMT's u unknown", "inside": "agrees",
                                "open": f"u > {number_text(c.needed, 2)}"}  # fmt: skip
-    return words.get(c.state, c.state) + (" !" if c.doubts else "")
+    return words.get(c.state, c.state)
+
+
+def _forbidden(c: Comparison) -> bool:
+    """Whether a flag forbids to call it agreement."""
+    return bool(c.doubts) and c.state in ("agrees", "inside")
 
 
 def _percent(t: _Thrust) -> str:
@@ -115,8 +125,8 @@ def _table(solved: Sequence[Result], found: Sequence[_Thrust]) -> list[str]:
     if found:
         lines.append("±, u: one standard uncertainty (BEMT: inputs and model); %: of the recorded")
         lines.append("value at that point; u > X: they agree only if the recording's own u exceeds X N")
-        if any(t.c.doubts for t in found):
-            lines.append("!: do not take it for agreement; the flag below says why")
+        if any(_forbidden(t.c) for t in found):
+            lines.append("flagged !: within the band, but no agreement; the flag below says why")
     return lines
 
 

@@ -149,14 +149,18 @@ _WORK = re.compile(
     r"((?:(?!(?:(?<=[a-z]{4})|(?<=\d))\. [A-Z`]|,(?: and)? [A-Z]\w+ \(?(?:1[89]|20)\d\d)[^;()])*)"
 )
 """Authors, year and what follows in a source, up to the next semicolon, bracket or sentence."""
-_LATEX = {c: f"\\{c}" for c in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "\\": "/"}
+_LATEX = {c: f"\\{c}" for c in "&%$#_"} | {
+    "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "\\": "/", "{": r"\textbraceleft{}",
+    "}": r"\textbraceright{}",
+}  # fmt: skip
+"""As LaTeX prints a character; BibTeX counts a brace behind a backslash too."""
 
 
 def bibtex(found: Sources) -> str:
     """Works that an answer stands on, as BibTeX.
 
     Each work with an author and a year that a source names is an entry ``@misc``, whose note is what the source says of
-    it ("not checked" included) and where it is used; a source without both is a comment. The program is ``@software``.
+    it ("not checked" included) and where it is used; a source without both is a comment.
 
     Parameters
     ----------
@@ -184,9 +188,10 @@ def bibtex(found: Sources) -> str:
             known = entries.get(key, (who, year, "", []))
             entries[key] = (*known[:2], known[2] or what, [*known[3], source.name])
         if not works:
-            bare.append(f"% {source.name}: {' '.join(source.source.split())}")
-    about = {"author": "{the bemt maintainers}", "title": "bemt", "year": YEAR, "version": __version__}
-    lines = [f"@software{{bemt, {', '.join(f'{k} = {{{v}}}' for k, v in about.items())}}}"]
+            words = " ".join(source.source.split()).replace("@", " at ")  # which would begin an entry
+            bare.append(f"% {source.name}: {words}")
+    about = {"author": "{the bemt maintainers}", "title": "bemt", "year": YEAR, "note": f"version {__version__}"}
+    lines = [f"@misc{{bemt, {', '.join(f'{k} = {{{v}}}' for k, v in about.items())}}}"]
     for key, (who, year, what, used) in entries.items():
         author = re.sub(r"\s*,\s*(?:and )?", " and ", who).replace(" et al.", " and others")
         doi = re.search(r"doi:\s*(10\.\d+/[^\s,)]+)", what)

@@ -99,7 +99,7 @@ def points(got: Dataset, name: str = "", sign: int = 1, run: int = 0) -> Dataset
     if np.any(silent):
         notes.append(f"rpm of 0 under thrust in {number_of(silent.sum(), 'row')}: no rpm there")
         data["rpm"] = np.where(silent, np.nan, data["rpm"])
-    out = _reduced(got, command, data, notes, run)
+    out = _below_limit(_reduced(got, command, data, notes, run))
     if len(out) < 4 or np.ptp(out.pulse_us) <= 0.0:
         got_text = f"{len(out)} steady points"
         raise InputError(Fault(name, "", got_text, "4 points or more at different pulse widths"))
@@ -125,6 +125,38 @@ def _reduced(got: Dataset, command: Array, data: dict[str, Array], notes: list[s
         notes.append(f"{lost} plateaus that do not settle were dropped")
     pulse = np.array([p.command for p in kept], dtype=float)
     return map_points(pulse, {key: np.array([p.mean.get(key, np.nan) for p in kept]) for key in data}, run, notes)
+
+
+LIMITED = 0.03
+"""Fall of the voltage, with more pulse width and no more current, from which the supply is in its limit. [1]"""
+
+
+def _below_limit(points: Dataset) -> Dataset:
+    """Points of one recording at which the supply holds its voltage.
+
+    A source of one resistance gives less voltage only with more current. Where the voltage falls and the current does
+    not rise, the supply limits its current: such a point says nothing about the drive at the voltage of the map.
+    """
+    current, voltage, pulse = points.current_A, points.voltage_V, points.pulse_us
+    inside = np.zeros(len(points), dtype=bool)
+    for way in (1, -1):  # commands that rise, and those that fall, read from the end
+        first = 0
+        order = np.arange(len(points))[::way]
+        for i, row in enumerate(order):
+            if i and pulse[row] <= pulse[order[i - 1]]:
+                first = i
+            before = order[first:i]
+            held = voltage[row] < (1.0 - LIMITED) * voltage[before]
+            inside[row] |= bool(np.any(held & (current[row] <= (1.0 + 0.5 * LIMITED) * current[before])))
+    inside &= current > 0.5 * np.nanmax(current, initial=0.0)
+    if not np.any(inside):
+        return points
+    limit = float(np.median(current[inside]))
+    inside |= current >= (1.0 - 0.5 * LIMITED) * limit
+    left = points.select(~inside)
+    top = f", from {np.min(pulse[inside]):.0f} us on" if len(left) else ""
+    note = f"{number_of(inside.sum(), 'point')}{top}, left out: at {limit:.3g} A the supply is in its current limit "
+    return replace(left, notes=(*left.notes, f"{note}(down to {np.min(voltage[inside]):.4g} V)"))
 
 
 def join(parts: Sequence[Dataset]) -> Dataset:

@@ -35,6 +35,35 @@ def extent(s: Settings) -> tuple[float, float, float]:
     return (6.0 if s.sideslip else 5.0) * size, low, 6 * size
 
 
+MEAN_Y_PLUS = (0.28, 0.87)
+"""Mean y+ over the blades of open rotors at rest, over that of `y_plus`: own runs (reports/cfd); in flight less. [1]"""
+CELLS_PER_BLADE, MORE_A_LEVEL = 34_600, 3.6
+"""Cells of a free open rotor at level 5, and factor from a level to the next: own runs (reports/cfd). [1]"""
+
+
+def first_cell(s: Settings) -> float:
+    """Height of the cells on the blades; the grid has no layers. [m]"""
+    return float(s.base_cell / 2**SURFACE_LEVEL)
+
+
+def y_plus(s: Settings, chord_m: float) -> float:
+    """Distance of the first cell's centre from the blade at 0.75 R, of a chord, in wall units [1].
+
+    Friction of a turbulent boundary layer on a flat plate, cf = 0.0592 Re^(-1/5) (H. Schlichting, "Boundary-Layer
+    Theory", ch. XXI; not checked), at the chord's Reynolds number and the speed of the section.
+    """
+    W = math.hypot(0.75 * abs(s.omega) * s.R, s.V)
+    cf = 0.0592 * (s.rho * W * chord_m / s.mu) ** -0.2
+    return s.rho * W * math.sqrt(0.5 * cf) * 0.5 * first_cell(s) / s.mu
+
+
+def cells(s: Settings) -> float:
+    """Number of cells; NaN for what no own run measured. [1]"""
+    if s.domain != "free" or s.duct is not None or s.body is not None or _narrow(s)[0]:
+        return math.nan
+    return float(CELLS_PER_BLADE * s.B / s.sectors * MORE_A_LEVEL ** (s.level - 5.0))
+
+
 def _graded(length: float, first: float) -> tuple[int, float]:
     """Count and ratio of last to first of cells that grow away from one that is `first` wide."""
     count = max(1, round(math.log(1 + length * (GROWTH - 1) / first) / math.log(GROWTH)))

@@ -22,7 +22,18 @@ from bemt.base.toml import check_field, entry
 from bemt.base.toml_text import Collector
 from bemt.rotors.case import Case
 from bemt.rotors.case.schema import PointTable
-from bemt.tools.cfd.openfoam.grid import block_mesh, create_patch, lines, set_fields, snappy, topo_set
+from bemt.tools.cfd.openfoam.grid import (
+    MEAN_Y_PLUS,
+    block_mesh,
+    cells,
+    create_patch,
+    first_cell,
+    lines,
+    set_fields,
+    snappy,
+    topo_set,
+    y_plus,
+)
 from bemt.tools.cfd.openfoam.run import all_run, control
 from bemt.tools.cfd.openfoam.settings import (
     DOMAINS,
@@ -328,9 +339,20 @@ def _sweep(model: MeshModel, rotor: Rotor) -> RunSweep:
                     float(np.abs(azimuth[first]).max()))  # fmt: skip
 
 
-def _notes(s: Settings, mach: float, left_out: bool) -> list[str]:
+def _grid_words(s: Settings, chord_m: float) -> str:
+    """What the grid will be, before it is made."""
+    count, y = cells(s), y_plus(s, chord_m)
+    size = "" if math.isnan(count) else f"about {float(f'{count:.2g}'):,.0f} cells; "
+    low, high = MEAN_Y_PLUS
+    mean = f" (the mean over blades: {low:.1g} to {high:.1g} of it in own runs at rest, less in flight)"
+    near = f"first cell {1e3 * first_cell(s):.2g} mm high, y+ near {y:.2g} at 0.75 R by the friction of a flat plate"
+    return f"expected grid: {size}{near}{mean}; the level sets both"
+
+
+def _notes(s: Settings, mach: float, left_out: bool, chord_m: float) -> list[str]:
     """What a reader of the run has to know."""
     said = {
+        _grid_words(s, chord_m): True,
         f"tip Mach number {mach:.3f}: {'compressible' if s.compressible else 'incompressible'}": True,
         "the vanes do not fit into the sector: left out, their centre body is there": left_out,
         "oblique flow with a frozen rotor is an approximation: one azimuth of the blades": bool(s.sideslip),
@@ -365,7 +387,7 @@ def settings_of(case: Case, run: Run, options: Options | None = None) -> tuple[S
     sideslip = math.radians(run.sideslip_deg)
     sector = run.sector or sector_choice(rotor.B, sideslip)
     duct, model, body, left_out = _solids(case, rotor, sector, options)
-    points = model.rotor.vertices
+    points, chord = model.rotor.vertices, float(rotor.blade.at(0.75 * rotor.R)[0])
     surfaces = [name for part in model.parts for name in part.names]
     solid = None if model.duct is None else model.duct.vertices
     around = None if solid is None else _extent(solid[:, 2], np.hypot(*solid[:, :2].T).max())
@@ -391,7 +413,7 @@ def settings_of(case: Case, run: Run, options: Options | None = None) -> tuple[S
         )  # fmt: skip
     except InputError as error:
         raise InputError([replace(fault, file=fault.file or file) for fault in error.faults]) from error
-    return settings, RunShapes(rotor, duct, tail, _notes(settings, mach, left_out), model)
+    return settings, RunShapes(rotor, duct, tail, _notes(settings, mach, left_out, chord), model)
 
 
 def write_openfoam(case: Case, out: Path, run: Run, options: Options | None = None) -> dict[str, Any]:
