@@ -157,8 +157,9 @@ def as_stated(files: Sequence[Any], run: Mapping[str, Any]) -> list[Any]:
         kept = {name: run[name] for name in ("pole_pairs", "ignore") if run.get(name)}
         if not any(told) and run.get("rpm") is None and not kept:
             return list(files)
-        return [stated_frame(f, *told) if hasattr(f, "columns") else _stated(f, run.get("rpm"), *told, **kept)
-                for f in files]  # fmt: skip
+        unit, column, sign = told
+        return [stated_frame(f, *told) if hasattr(f, "columns")
+                else _stated(f, run.get("rpm"), unit, column, sign, **kept) for f in files]  # fmt: skip
     return list(runs_of(files, run_from(list(files), **run), insist=True)[0])
 
 

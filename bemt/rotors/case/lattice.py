@@ -172,7 +172,7 @@ def _with_stopped(
     values |= {"rpm": rpm, "airspeed_m_s": airspeed_m_s}
     values["density_kg_m3"] = np.full(rpm.size, found["density_kg_m3"][0])
     u_by = {origin: {key: spread(v) for key, v in part.items()} for origin, part in found.u_by.items()}
-    flags = [(UNKNOWN if np.isnan(x) else STOPPED,) for x in rpm]
+    flags: list[tuple[str, ...]] = [(UNKNOWN if np.isnan(x) else STOPPED,) for x in rpm]
     for row, words in zip(rows, found.flags if np.any(turning) else (), strict=False):
         flags[row] = words
     return replace(found, values=values, u={}, u_by=u_by, flags=tuple(flags), lines=())

@@ -110,8 +110,8 @@ def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str], list
         assumed.append(f"taken: {size}, hub {hub:.3g} mm, by the innermost station; yours: hub_ratio in case.toml")
     bare = wanted.label and not (wanted.stations or wanted.scan or wanted.fan or wanted.series)
     if bare:
-        size = fresh.read_label(str(wanted.label), wanted.blades)
-        read = fresh.read_as(str(wanted.label), size.diameter_in, size.pitch_in)
+        given = fresh.read_label(str(wanted.label), wanted.blades)
+        read = fresh.read_as(str(wanted.label), given.diameter_in, given.pitch_in)
         notes += [read] if read != wanted.label else []
     kind = [line for line in [fresh.open_kind(str(wanted.label), wanted.blades)] if line] if bare else []
     return folder, sorted(files), [*assumed, *kind, *notes, *unused]
