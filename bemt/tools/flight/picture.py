@@ -13,6 +13,7 @@ from bemt.base.arrays import Array
 from bemt.base.canvas import BLUE, GREEN, ORANGE
 from bemt.base.units import G0
 from bemt.tools.flight.answer import FlightAnswer
+from bemt.tools.flight.judge import FlightVerdict
 from bemt.tools.flight.text import headline, stated_size
 
 _LINES = canvas.CYCLE[:6]
@@ -64,7 +65,7 @@ def _flow(ax: Any, answer: FlightAnswer) -> None:
     ax.legend(frameon=False)
 
 
-def _over_time(t: Array, x: Array) -> tuple[Array, Array]:
+def over_time(t: Array, x: Array) -> tuple[Array, Array]:
     """Middles of cells of equal time, (M,), and means of columns, (N, B), in them, (M, B); NaN in a gap."""
     cells = max(min(max(int((t[-1] - t[0]) / _CELL_S), 10), 300, t.size // 5), 1)
     edges = np.linspace(t[0], t[-1], cells + 1)
@@ -82,7 +83,7 @@ def _drives(ax: Any, answer: FlightAnswer) -> None:
         _empty(ax, "no flight with motors running")
         return
     t, x = log.t[on], drive[on]
-    when, mean = _over_time(t, x)
+    when, mean = over_time(t, x)
     share = 100 * (mean / mean.mean(axis=1, keepdims=True) - 1.0)
     for i in range(share.shape[1]):
         name = f"{i + 1}" if i else "motor 1"
@@ -130,6 +131,16 @@ def _thrust(ax: Any, answer: FlightAnswer, mass_kg: float | None) -> None:
     ax.legend(frameon=False)
 
 
+def _beside_others(rotors: int) -> float:
+    """Change of a drive against those of the other motors, over that of its share, which holds the motor itself."""
+    return rotors / max(rotors - 1, 1)
+
+
+def bars_of(judged: FlightVerdict) -> Array:
+    """Change of each motor's drive against those of the others, (B,) [1]."""
+    return _beside_others(judged.readings.size) * judged.readings
+
+
 def _balance(ax: Any, answer: FlightAnswer) -> None:
     j = answer.judged
     if not j.readings.size:
@@ -138,11 +149,10 @@ def _balance(ax: Any, answer: FlightAnswer) -> None:
     accused = {int(n) - 1 for e in j.said.effects for n in re.findall(r"\d+", e)}
     colours = [_LINES[i % len(_LINES)] for i in range(j.readings.size)]
     edges = [1.8 if i in accused else 0.0 for i in range(j.readings.size)]
-    beside_others = j.readings.size / max(j.readings.size - 1, 1)  # a share holds the motor itself
-    bars = 100 * beside_others * j.readings
+    bars = 100 * bars_of(j)
     ax.bar(np.arange(1, bars.size + 1), bars, color=colours, edgecolor="k", linewidth=edges)
     if np.isfinite(j.scatter):
-        two = 200 * beside_others * j.scatter
+        two = 200 * _beside_others(bars.size) * j.scatter
         ax.axhspan(-two, two, color="0.5", alpha=0.2, lw=0,
                    label="healthy flights (2 sd)" if j.given else "healthy vehicles (2 sd)")  # fmt: skip
     if (stated := stated_size(j)) is not None and len(accused) == 1:
