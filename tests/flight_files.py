@@ -164,11 +164,15 @@ def dataflash(
     return bytes(out)
 
 
-def ulog(flight: Hover, imu_hz: float = 200.0, fifo: bool = False, airframe: int = 0, motors: bool = True) -> bytes:
+def ulog(
+    flight: Hover, imu_hz: float = 200.0, fifo: bool = False, airframe: int = 0, motors: bool = True,
+    landed: bool | None = None,
+) -> bytes:  # fmt: skip
     """A ULog: parameters of the allocation, actuator_motors, esc_status, sensors, attitude, position, battery.
 
     With the number of an airframe it is one of before the allocation: pulse widths, and no speeds; below zero, of the
     allocation, with motor 1 at the last output. Without motors actuator_controls_0 stands in their place.
+    What the land detector said once, at the start, may be added.
     """
     out = bytearray(b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0))
 
@@ -187,6 +191,7 @@ def ulog(flight: Hover, imu_hz: float = 200.0, fifo: bool = False, airframe: int
         "vehicle_attitude": "uint64_t timestamp;float[4] q;",
         "vehicle_local_position": "uint64_t timestamp;float x;float y;float z;float vx;float vy;float vz;",
         "battery_status": "uint64_t timestamp;float voltage_v;float current_a;",
+        "vehicle_land_detected": "uint64_t timestamp;bool landed;",
         "sensor_accel_fifo": "uint64_t timestamp;uint64_t timestamp_sample;float dt;float scale;uint8_t samples;"
         "int16_t[32] x;int16_t[32] y;int16_t[32] z;",
     }
@@ -213,6 +218,8 @@ def ulog(flight: Hover, imu_hz: float = 200.0, fifo: bool = False, airframe: int
     def put(name: str, form: str, *values: object) -> None:
         message("D", struct.pack("<H", names.index(name)) + struct.pack("<" + form, *values))
 
+    if landed is not None:
+        put("vehicle_land_detected", "Q?", 1_000_000, landed)
     t = np.arange(0.0, flight.seconds, 0.02)
     command, rpm = flight.drives(t)
     height = np.clip(t - 1.0, 0.0, 3.0)

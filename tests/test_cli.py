@@ -500,3 +500,9 @@ def test_long_work_shows_that_it_goes_on_where_stderr_is_a_pipe_too(
         say("solving")
         time.sleep(0.2)
     assert not capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["diagnose", "compare", "import"])
+def test_what_is_stated_of_columns_has_a_help_of_its_own_each(name: str) -> None:
+    told = {p.name: p.help for p in parameters(registry.find(name)) if p.name in ("unit", "column", "sign")}
+    assert len(told) == 3 and all(told.values()) and len(set(told.values())) == 3

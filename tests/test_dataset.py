@@ -191,3 +191,8 @@ def test_headings_of_a_table_are_converted_by_their_unit_and_all_faults_are_said
     with pytest.raises(InputError) as error:
         from_pandas(pd.DataFrame({"thrust": [1.0], "torque_Nm": ["x"]}))
     assert {fault.where for fault in error.value.faults} == {"thrust", "torque_Nm"}
+
+
+def test_it_iterates_over_the_names_that_in_and_brackets_take() -> None:
+    d = Dataset("bemt", "p", {"rpm": [4000.0, 6000.0], "thrust_N": [2.1, 4.7]})
+    assert list(d) == ["rpm", "thrust_N"] and all(name in d and len(d[name]) == len(d) for name in d)

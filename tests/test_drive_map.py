@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.data import readers as importers
+from bemt.data.recordings.reduce import reduce
 from bemt.physics.dataset import Dataset
 from bemt.tools.drive import bench_map, map_result
 from bemt.tools.drive.bench_map import join, map_points, points
@@ -325,3 +326,26 @@ def test_an_emptying_battery_is_no_supply_in_its_limit() -> None:
     runs = [made(LEVELS[2:], volts) for volts in np.linspace(12.6, 10.8, 4)]
     log = join([replace(run, provenance={"ramp": False}) for run in runs])
     assert bench_map._below_limit(log) is log
+
+
+@pytest.mark.parametrize("layout", ["samples", "table"])
+def test_the_map_takes_the_zero_at_rest_as_import_does(layout: str, tmp_path: Path) -> None:
+    """A stand that reads 0.3 N with the motor stopped, and drifts: at rest the map gives no thrust."""
+    pulse = np.concatenate([[1000.0], np.linspace(1100.0, 2000.0, 10), [1000.0]])
+    pulse = np.repeat(pulse, 40) if layout == "samples" else pulse
+    time = 0.05 * np.arange(pulse.size) if layout == "samples" else 10.0 * np.arange(pulse.size)
+    share = np.clip((pulse - 1080.0) / 920.0, 0.0, None)
+    truth, zero = 20.0 * share**1.7, 0.3 + 0.2 * time / time[-1]
+    rows = zip(time, 1e-6 * pulse, truth + zero, 9000.0 * share**0.85, strict=True)
+    file = tmp_path / "t.csv"
+    file.write_text(
+        "time (s),pulse width (s),thrust (N),rpm\n"
+        + "".join(f"{a:.3f},{b:.7f},{c:.5f},{d:.2f}\n" for a, b, c, d in rows)
+    )
+    found = points(importers.read(file))
+    expected = 20.0 * np.clip((found.pulse_us - 1080.0) / 920.0, 0.0, None) ** 1.7
+    assert np.max(np.abs(found.thrust_N - expected)) < 0.02
+    assert any(note.startswith("thrust_N: zero") for note in found.notes)
+    reduced = reduce(importers.read(file))
+    at = np.array([np.argmin(np.abs(found.pulse_us - 1e6 * p)) for p in reduced["pwm_s"]])
+    assert np.allclose(found.thrust_N[at], reduced.thrust_N, atol=0.02)

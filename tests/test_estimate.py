@@ -138,3 +138,17 @@ def test_at_rest_the_figure_of_merit_stands_where_an_efficiency_would_be_zero() 
     assert "FM" in found.text and "FM" not in bemt.estimate("10x5", 6000, 10.0).text
     swept = bemt.sweep([Path("cases/prop_10x5").as_posix()]).details
     assert f"{rest['FM']:.1f}" in swept[swept.index("FM") :]
+
+
+@pytest.mark.parametrize(("label", "first"), [
+    ("10x47", "10x47 read as 10x4.7: "), ("13x65", "13x65 read as 13x6.5: "), ("10x4.7", "10x4.7: "),
+    ("APC 10x5E", "APC 10x5E: "),
+])  # fmt: skip
+def test_the_first_line_says_how_a_label_was_read(label: str, first: str) -> None:
+    assert bemt.estimate(label, rpm=5000).text.startswith(first)
+
+
+@pytest.mark.parametrize(("label", "command"), [("69mm", "bemt new 69mm --fan"), ("DS-30", "bemt new 70mm --fan")])
+def test_the_name_or_size_of_a_fan_leads_to_new(label: str, command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["estimate", label, "--rpm", "5000"]) == 2
+    assert command in capsys.readouterr().err

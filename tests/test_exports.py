@@ -1093,3 +1093,16 @@ def test_what_the_kernel_cannot_make_leaves_the_other_formats(tmp_path: Path, mo
     made = bemt.export("10x5", tmp_path / "a", ["qprop", "flow"])
     assert made.exit_code == 2 and [file.suffix for file in made.files] == [".qprop"]
     assert any("flow: got a failure of the CAD kernel" in line for line in map(str, made.complaints))
+
+
+def test_the_hand_of_a_simulator_s_motor_is_an_option(tmp_path: Path, project: Path) -> None:
+    """As `rotation` in the case: the same files, and the print's `both` is refused."""
+    case = project / "cases" / "prop_8x5"
+    bemt.export(str(case), tmp_path / "option", "gazebo", hand="left")
+    left = load_case(case / "case.toml").replaced({"rotor.rotation": "left"})
+    export_case(Job(left), tmp_path / "case", ["gazebo"])
+    one, other = ((tmp_path / name / "gazebo").glob("*.sdf") for name in ("option", "case"))
+    text = next(one).read_text()
+    assert text == next(other).read_text() and "<turningDirection>cw</turningDirection>" in text
+    with pytest.raises(InputError, match="printable"):
+        bemt.export(str(case), tmp_path / "both", "gazebo", hand="both")

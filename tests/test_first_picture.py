@@ -122,3 +122,16 @@ def test_a_report_holds_the_runs_of_its_user(log: Path, tmp_path: Path) -> None:
     page = (out / "report.html").read_text(encoding="utf-8")
     assert "nothing recorded" not in page.lower()
     assert page.index('alt="Recording and prediction"') < page.index("<h3>Geometry</h3>")
+
+
+@pytest.mark.parametrize(("kind", "head"), [("png", b"\x89PNG"), ("pdf", b"%PDF"), ("svg", b"<?xml")])
+def test_a_picture_is_png_pdf_or_svg_and_the_same_each_time(kind: str, head: bytes, case: Case) -> None:
+    n = np.linspace(5000.0, 9000.0, 4)
+    view = against_band(case, [points(case, n, np.zeros(4), 0.0)])
+    assert view.picture(kind).startswith(head) and view.picture(kind) == view.picture(kind)
+
+
+def test_the_title_ends_its_lines_with_its_phrases(case: Case) -> None:
+    n = np.linspace(5000.0, 9000.0, 4)
+    view = against_band(case, [points(case, n, np.zeros(4), 0.0)])
+    assert view._title().splitlines() == [case.name, "readings in the 95 % band: 4 of 4 thrust, 4 of 4 torque"]

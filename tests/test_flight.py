@@ -18,6 +18,7 @@ from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.rotors.case import load_case
 from bemt.rotors.propeller import rotor_of
+from bemt.tools.flight import picture
 from bemt.tools.flight.answer import FlightAnswer, answer_on
 from bemt.tools.flight.balance import BUILD, axes_of, blade, features
 from bemt.tools.flight.change import change_in
@@ -28,7 +29,7 @@ from bemt.tools.flight.log import FlightLog
 from bemt.tools.flight.picture import flight_picture
 from bemt.tools.flight.read import read_log
 from bemt.tools.flight.speed_sensor import checked
-from bemt.tools.flight.text import text
+from bemt.tools.flight.text import stated_size, text
 from bemt.tools.flight.thrust_curve import inflow, motor_lag, simulator_constants
 from bemt.tools.flight.vibration import vibration
 from bemt.tools.flight.wind import wind
@@ -596,3 +597,29 @@ def test_the_table_of_flights_says_what_each_thrust_is_over() -> None:
     one = _Row("a", "csv", 4, 9.0, "none", "", "", 4.0, 0.04, "N/kg", "command", None, None, None, "", None, None)
     told = _aligned([one, replace(one, thrust_over="speed^2")])
     assert [("command" in line, "speed^2" in line) for line in told.splitlines()[1:]] == [(True, False), (False, True)]
+
+
+def test_the_picture_has_a_gap_where_nothing_was_in_the_air() -> None:
+    """Means over cells of equal time: none is drawn across six seconds on the ground, and elsewhere they are right."""
+    t = np.concatenate([np.arange(0.0, 8.0, 0.01), np.arange(14.0, 20.0, 0.01)])
+    when, mean = picture.over_time(t, np.stack([2.0 + 0.0 * t, t], axis=1))
+    on = (when < 7.5) | (when > 14.5)
+    assert np.all(np.isnan(mean[(when > 8.5) & (when < 13.5)])) and ((when > 8.5) & (when < 13.5)).sum() >= 8
+    np.testing.assert_allclose(mean[on], np.stack([2.0 + 0.0 * when, when], axis=1)[on], atol=0.02)
+
+
+@pytest.mark.parametrize(("kind", "head"), [("png", b"\x89PNG"), ("pdf", b"%PDF"), ("svg", b"<?xml")])
+def test_a_flight_is_drawn_as_png_pdf_or_svg(kind: str, head: bytes, flights: Path) -> None:
+    answer = answer_on(read_log(flights / "before_1.usdlog"))
+    assert flight_picture(answer, kind=kind).startswith(head)
+
+
+@pytest.mark.parametrize("healthy", [0, 5])
+def test_the_bar_of_a_motor_and_the_stated_size_are_one_number(healthy: int) -> None:
+    """A rotor driven 25 % harder, beside the others: its bar says so, though its share of the whole changes by less."""
+    calm = [np.random.default_rng(k).normal(0.0, 0.002, 4) for k in range(healthy)]
+    j = judge(np.array([0.0, 0.0, 0.25, 0.0]), calm, layout_of("quad-x", 4))
+    bars = picture.bars_of(j)
+    assert bars[2] == pytest.approx(0.25, abs=0.005) and np.sum(bars) == pytest.approx(0.0, abs=1e-9)
+    if (stated := stated_size(j)) is not None:
+        assert abs(bars[2] - stated.size) < stated.half

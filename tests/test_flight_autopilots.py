@@ -19,9 +19,10 @@ from bemt.tools.flight.answer import FlightAnswer, answer_on
 from bemt.tools.flight.change import change_in
 from bemt.tools.flight.judge import BesideBalance, judge, posterior
 from bemt.tools.flight.layout import LAYOUTS, effect_matrix, layout_of
-from bemt.tools.flight.log import FlightLog
+from bemt.tools.flight.log import FlightLog, held
 from bemt.tools.flight.read import read_log
 from bemt.tools.flight.speed_sensor import speed_changes
+from bemt.tools.flight.text import text
 from bemt.tools.flight.thrust_curve import inflow
 
 pytest.importorskip("pyulog")
@@ -274,3 +275,24 @@ def test_damaged_copies_never_raise_anything_else(count: int, tmp_path: Path) ->
     flight = Hover(seconds=6.0)
     samples = [dataflash(flight, bursts=True), ulog(flight, imu_hz=50.0, fifo=True)]
     broken_copies(samples, count, tmp_path / "log")
+
+
+@pytest.mark.parametrize("landed", [False, True])
+def test_a_vehicle_that_says_it_never_left_the_ground_has_no_constants(landed: bool, tmp_path: Path) -> None:
+    """The autopilot's own word counts: the same outputs are a flight, or none and nothing of one."""
+    flight = Hover(seconds=12.0)
+    log = read(tmp_path, "px4", flight, landed=landed)
+    answer = answer_on(log, mass_kg=1.5)
+    assert log.flying.any() != landed
+    if not landed:
+        assert np.array_equal(log.flying, read(tmp_path, "px4", flight).flying)
+        assert answer.found.constants and answer.simulator
+        return
+    assert answer.judged.said.verdict == "insufficient" and "ground" in answer.judged.said.why
+    assert not (answer.found.constants or answer.simulator or answer.curve or answer.vibration.rms or answer.demand)
+    assert "hover" not in text(answer) and "Vibration" not in text(answer)
+
+
+def test_a_state_holds_until_the_next_message() -> None:
+    t, v = held((np.array([0.0, 60.0, 200.0]), np.array([0.0, 1.0, 0.0])))  # type: ignore[misc]
+    assert np.interp([59.9, 60.1, 199.9, 200.1, 300.0], t, v).tolist() == [0.0, 1.0, 1.0, 0.0, 0.0]

@@ -410,3 +410,41 @@ def test_an_estimate_prints_its_text_with_parameters_and_takes_a_reading_by_name
 def test_the_help_of_the_package_lists_its_functions() -> None:
     shown = pydoc.plain(pydoc.render_doc(bemt))
     assert all(f"    {name}(" in shown for name in ("estimate", "diagnose", "drive", "propeller"))
+
+
+@pytest.mark.parametrize("angle", [None, 30.0])
+def test_a_rotor_that_stands_still_is_nan_and_flagged_and_the_others_are_solved(angle: float | None) -> None:
+    p = bemt.propeller("10x5")
+    d = p.solve(rpm=[0, 5000, float("nan")], airspeed_m_s=5.0, angle_deg=angle)
+    alone = p.solve(rpm=5000, airspeed_m_s=5.0, angle_deg=angle)
+    assert d.converged.tolist() == [False, True, False]
+    assert [key for key in alone] == [key for key in d]
+    for key in alone:
+        if key not in ("rpm", "airspeed_m_s", "density_kg_m3"):
+            np.testing.assert_array_equal(d[key], [np.nan, alone[key][0], np.nan])
+    np.testing.assert_array_equal(d.u_thrust_N, [np.nan, alone.u_thrust_N[0], np.nan])
+    assert d.flags[0] == ("stands still: no load is computed",) and d.flags[2][0].startswith("speed unknown")
+    assert d.flags[1] == alone.flags[0]
+
+
+def test_a_stopped_rotor_alone_is_no_zero_either() -> None:
+    d = bemt.propeller("10x5").solve(0)
+    assert np.isnan(d.thrust_N[0]) and not d.converged[0] and "stands still" in d.flags[0][0]
+    c = bemt.propeller("10x5").curve(rpm=[0, 6000], J=[0.0, 0.3], bands=False)
+    assert c.converged.tolist() == [False, False, True, True]
+    with pytest.raises(bemt.InputError, match="got -5; expected speeds of 0 rev/min or more. Drop the sign"):
+        bemt.propeller("10x5").solve([0, -5])
+    with pytest.raises(bemt.InputError) as caught:
+        bemt.propeller("10x5").along_blade(0)
+    assert "above 0" in str(caught.value) and "sign" not in str(caught.value)
+
+
+def test_who_gives_an_angle_reads_the_loads_in_the_plane_in_axial_flow_too() -> None:
+    p = bemt.propeller("10x5")
+    for key in ("sideslip_rad", "H_force_N", "Y_force_N", "roll_moment_Nm", "pitch_moment_Nm"):
+        found = p.solve(rpm=5000, airspeed_m_s=5.0, angle_deg=[0, 0], bands=False)[key]
+        np.testing.assert_array_equal(found, [0.0, 0.0])
+        assert p.solve(rpm=5000, airspeed_m_s=5.0, angle_deg=[0, 1e-9], bands=False)[key] == pytest.approx(
+            0.0, abs=1e-6
+        )
+        assert key not in p.solve(rpm=5000, airspeed_m_s=5.0, bands=False)

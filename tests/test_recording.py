@@ -245,3 +245,41 @@ def test_electrical_revolutions_are_no_speed_before_the_pole_pairs_are_stated(he
     assert not [f for f in check(kept) if f.severity == "error"]
     with pytest.raises(InputError, match="pole"):
         bemt.diagnose(file, case="10x5")
+
+
+def _electrical(folder: Path) -> Path:
+    """A table whose speed counts electrical revolutions, in a folder of its own."""
+    folder.mkdir()
+    rows = [(3000, 1.1), (4000, 2.0), (5000, 3.1), (6000, 4.6), (7000, 6.2), (8000, 8.1)]
+    (folder / "esc.csv").write_text("eRPM,Thrust (N)\n" + "".join(f"{7 * n},{T}\n" for n, T in rows))
+    return folder / "esc.csv"
+
+
+def test_what_is_stated_is_kept_in_the_current_folder_and_finds_its_table(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The folder of the data may be read-only: nothing is written there, and both may move together."""
+    file, here = _electrical(tmp_path / "data"), tmp_path / "work"
+    here.mkdir()
+    monkeypatch.chdir(here)
+    step = next(note for note in import_file(file).notes if "bemt import" in note)
+    assert step.endswith("--pole-pairs PAIRS --out recording.toml")
+    bemt.import_("../data/esc.csv", pole_pairs=7, out="recording.toml")
+    assert [p.name for p in file.parent.iterdir()] == ["esc.csv"]
+    assert import_file(here / "recording.toml")["rpm"][0] == pytest.approx(3000)
+    again = next(note for note in import_file(file).notes if "bemt import" in note)
+    assert again.endswith("--out esc.toml")
+    (tmp_path / "data").rename(tmp_path / "moved")
+    with pytest.raises(InputError, match=r"recording\.file: got '\.\./data/esc\.csv'"):
+        import_file("recording.toml")
+
+
+def test_pole_pairs_can_be_tried_before_they_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = _electrical(tmp_path / "data")
+    monkeypatch.chdir(tmp_path)
+    tried = bemt.import_("data/esc.csv", pole_pairs=7)
+    assert tried.exit_code == 0 and "bemt import data/esc.csv --pole-pairs 7 --out recording.toml" in tried.text
+    assert "3000" in tried.text and not list(tmp_path.glob("**/*.toml"))
+    kept = bemt.import_(file, pole_pairs=7, out="recording.toml")
+    points = [told.to_dict()["files"][0]["reduction"]["points"] for told in (tried, kept)]
+    assert points[0] == points[1]

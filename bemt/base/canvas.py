@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import io
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
+
+from bemt.base.errors import Fault, InputError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -52,4 +55,31 @@ def png(made: Figure, dpi: int = 110, optimize: bool = False) -> bytes:
     """PNG bytes that depend on the figure alone; to `optimize` takes time and saves bytes."""
     out = io.BytesIO()
     made.savefig(out, format="png", dpi=dpi, metadata={"Software": None}, pil_kwargs={"optimize": optimize})
+    return out.getvalue()
+
+
+_DATES = {"pdf": "CreationDate", "svg": "Date"}
+
+
+def kind_of(name: str) -> str:
+    """Kind of picture that a file name asks for by its ending: png, pdf or svg.
+
+    >>> kind_of("out/E8.PDF")
+    'pdf'
+    """
+    kind = Path(name).suffix.lower().removeprefix(".")
+    if kind not in ("png", *_DATES):
+        raise InputError(Fault("", "picture", name, "a name that ends in .png, .pdf or .svg"))
+    return kind
+
+
+def drawn(made: Figure, kind: str, dpi: int = 110) -> bytes:
+    """A picture of a `kind` as :func:`kind_of` gives it, in bytes that depend on the figure alone."""
+    import matplotlib
+
+    if kind == "png":
+        return png(made, dpi)
+    out = io.BytesIO()
+    with matplotlib.rc_context({"svg.hashsalt": "bemt"}):
+        made.savefig(out, format=kind, metadata={_DATES[kind]: None})
     return out.getvalue()

@@ -78,8 +78,12 @@ def diagnose(
         What runs of this stand differ by, standard deviation; 0.2 to 2, from the readings, by default. [%]
     top_rpm : float, optional
         Fastest that the stand may run: no run beyond it is asked for. [rev/min]
-    unit, column, sign : mapping
-        What the headings of every table, or the exports of a CFD run, do not say: thrust=N, thrust=fz, torque=-1.
+    unit : mapping
+        Unit of a quantity or heading of every table, or of a CFD run, that states none: thrust=N.
+    column : mapping
+        Heading of a quantity, in every table or in the exports of a CFD run: thrust=fz.
+    sign : mapping
+        Sign of a load: torque=-1; -1 alone turns all.
     pole_pairs : int, optional
         Of the motor, where the speed of every table counts electrical revolutions; 14 magnets are 7 pairs.
     zones : sequence of str
@@ -160,8 +164,12 @@ def compare(
         Air of `a` or `b`, overrides the recording: 22C,1013hPa, or only 22C, or 1.19kg/m3; wind: 18m/s, 35kt.
     rpm : float, optional
         One file beside the case: its speed, where no file states it. [rev/min]
-    unit, column, sign : mapping
-        What the headings of both tables, or the exports of one CFD run, do not say: thrust=N, thrust=fz, torque=-1.
+    unit : mapping
+        Unit of a quantity or heading of both tables, or of one CFD run, that states none: thrust=N.
+    column : mapping
+        Heading of a quantity, in both tables or in the exports of one CFD run: thrust=fz.
+    sign : mapping
+        Sign of a load: torque=-1; -1 alone turns all.
     pole_pairs : int, optional
         Of the motor, where the speed of both tables counts electrical revolutions; 14 magnets are 7 pairs.
     zones : sequence of str

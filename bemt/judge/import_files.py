@@ -51,11 +51,11 @@ def import_(
     revolutions : int, optional
         Average the last so many revolutions; 4, or half, by default.
     pole_pairs : int, optional
-        Of the motor, where a speed counts electrical revolutions; 14 magnets are 7 pairs. Goes into recording.toml.
+        Of the motor, where a speed counts electrical revolutions; 14 magnets are 7 pairs. `out` keeps it.
     case : Propeller, str or path, optional
         Say how the recordings lie in the prediction band of this case.
     picture : path, optional
-        With a case: draw the recordings inside the band, to this PNG file.
+        With a case: draw the recordings inside the band, to this file: .png, .pdf or .svg.
     unit : mapping
         What the files do not say: unit of a quantity or column, thrust=N.
     column : mapping
@@ -106,6 +106,7 @@ def import_(
     >>> import_(file).to_dict()["schema"]
     'bemt.import/1'
     """
+    from bemt.base.canvas import kind_of
     from bemt.base.errors import Fault, InputError
     from bemt.base.given import paths_text
     from bemt.data.recordings import cfd_options, load
@@ -113,8 +114,8 @@ def import_(
 
     if picture is not None and case is None:
         raise InputError(Fault("--picture", "", "no case", "--case CASE, whose band is drawn"))
-    if picture is not None and Path(picture).suffix.lower() != ".png":
-        raise InputError(Fault("", "picture", str(picture), "a name that ends in .png"))
+    if picture is not None:
+        kind_of(os.fspath(picture))
     names, wrote, kept = paths_text("files", files, 1), "", ""
     names = [f"{name}#{sheet}" for name in names] if sheet else names
     choice = asked(rpm, period_s, revolutions)
@@ -132,19 +133,17 @@ def import_(
     run = run | dict.fromkeys(of_tables) if measured else run
     lines, insist = [], any((*told.values(), *run.values(), left, out is not None, pole_pairs))
     table = names[0] if len(names) == 1 and measured else ""
-    if insist and table and (out is not None or pole_pairs or left):
+    if insist and table and out is not None:
         from bemt.data.recordings.cfd_options import write_recording
 
-        if out is None:  # no command takes these two: a file keeps them
-            hint = f"Add --out {Path(table).with_name('recording.toml').as_posix()}"
-            raise InputError(Fault("", "--out", "nothing", "a recording.toml that keeps what you state", hint))
         facts: dict[str, Any] = {**told, "pole_pairs": pole_pairs, "density_kg_m3": density_kg_m3, "ignore": left}
         written = write_recording(table, os.fspath(out), rpm=rpm, airspeed_m_s=airspeed_m_s, **facts).as_posix()
         kept, said = written, {}
         names, told, out, left, insist = [written], dict.fromkeys(told, []), None, [], False
-    elif insist and measured and out is None and not (pole_pairs or left):
-        stated = dict(zip(names, load.as_stated(names, told), strict=True))
-        told, insist = dict.fromkeys(told, []), False
+    elif insist and measured and out is None:
+        facts = {**told, "pole_pairs": pole_pairs, "ignore": left}
+        stated = dict(zip(names, load.as_stated(names, facts), strict=True))
+        told, left, insist = dict.fromkeys(told, []), [], False
     elif pole_pairs:
         raise InputError(Fault("", "--pole-pairs", f"{pole_pairs} with these files", "one table of measurements"))
     if measured and not kept and any(v is not None for v in of_tables.values()):
@@ -194,6 +193,7 @@ def _beside(
     files: Sequence[Any], case: object, picture: object, rpm: float | None, airspeed_m_s: float | None, stated: bool
 ) -> tuple[str, Mapping[str, object]]:
     """How the files lie in the prediction band of the case: a sentence and a document; drawn where that is asked."""
+    from bemt.base.canvas import kind_of
     from bemt.base.tables import write_atomic
     from bemt.judge.diagnose.figures import first_picture
     from bemt.judge.diagnose.load import load_all
@@ -203,5 +203,5 @@ def _beside(
     cases, records = load_all(files, [case], rpm=speed, airspeed_m_s=wind)
     (view,) = first_picture(records, cases)
     if picture is not None:
-        write_atomic(Path(str(picture)), view.png())
+        write_atomic(Path(str(picture)), view.picture(kind_of(str(picture))))
     return " ".join((view.sentence, *view.notes)), view.document()

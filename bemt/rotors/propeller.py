@@ -145,7 +145,8 @@ class Propeller:
         -------
         Dataset
             Kind ``bemt``; every channel is (N,), the arguments broadcast and flattened in C order. A point without a
-            solution is NaN and flagged, never zero. A point that no measured rotor covers is flagged, and its band is
+            solution is NaN and flagged, never zero; so is one that stands still, or whose speed is NaN among others. A
+            point that no measured rotor covers is flagged, and its band is
             wider. With an angle it also has ``sideslip_rad``, ``H_force_N`` (in the
             plane of the disk, downstream), ``Y_force_N`` (to the advancing side), ``roll_moment_Nm`` (lifts the
             advancing side) and ``pitch_moment_Nm`` (lifts the upstream side), all without a band.
@@ -153,8 +154,8 @@ class Propeller:
         Raises
         ------
         InputError
-            If both `airspeed_m_s` and `J` are given, numbers are not finite, an angle is not within 0 to 180 deg, or
-            the rotor is ducted and the angle not 0.
+            If both `airspeed_m_s` and `J` are given, numbers are not finite, a speed is below zero, an angle is not
+            within 0 to 180 deg, or the rotor is ducted and the angle not 0.
 
         Examples
         --------
@@ -167,11 +168,14 @@ class Propeller:
         """
         from bemt.rotors.case import lattice
 
-        n, V, angle = turned(self.case, *conditions(self.case, rpm, airspeed_m_s, J), angle_deg)
+        n, V, angle = turned(self.case, *conditions(self.case, rpm, airspeed_m_s, J, stopped=True), angle_deg)
         density = None if density_kg_m3 is None else number("density_kg_m3", density_kg_m3)
         with in_words_of_the_library({"air.density_kg_m3": "density_kg_m3"}, self.case.path.as_posix()):
             found = lattice.solve(self.case, n, V, density, bands, angle)
-        more = DUCTED if self.case.ducted else (*OBLIQUE, *PAIRED)
+        if angle_deg is not None:  # in axial flow too: a caller who sweeps the angle reads the same channels
+            none = np.where(found.converged, 0.0, np.nan)
+            found = replace(found, values={**dict.fromkeys(OBLIQUE, none), **found.values})
+        more = (*(DUCTED if self.case.ducted else PAIRED), *OBLIQUE)
         names = [key for key in (*CHANNELS, *more) if key in found]
         by = {origin: {key: v for key, v in part.items() if key in names} for origin, part in found.u_by.items()}
         notes = ("bands, one standard deviation: declared unknowns (input), real rotors compared with BEMT (model), "
@@ -275,7 +279,7 @@ class Propeller:
         (True, array([0.09, 0.06, 0.01]))
         """
         given = J is not None or airspeed_m_s is not None
-        n = np.atleast_1d(numbers("rpm", self.case.rpm if rpm is None else rpm))
+        n = np.atleast_1d(numbers("rpm", self.case.rpm if rpm is None else rpm, finite=False))
         x = np.linspace(0.0, 0.9, 19)
         if given:
             x = np.atleast_1d(numbers("airspeed_m_s", airspeed_m_s) if J is None else numbers("J", J))

@@ -368,8 +368,7 @@ class Builder:
         asked = _asked(self.unitless, self.channels)
         if asks := [*self.asks, *asked.values()]:
             file = Path(self.table.source.name)
-            out = shlex.quote(file.with_name("recording.toml").as_posix())
-            step = f"bemt import {shlex.quote(file.as_posix())} {' '.join(asks)} --out {out}"
+            step = f"bemt import {shlex.quote(file.as_posix())} {' '.join(asks)} --out {kept_in([file])[0]}"
             own = [f"your {what} in place of {mark}" for mark, what in _OWN.items() if mark in step]
             self.warnings.append(f"in one step, with {' and '.join(own)}: {step}" if own else step)
             if self.asks or _NEEDED & asked.keys():
@@ -381,6 +380,21 @@ class Builder:
             self.format, self.kind, self.channels, self.warnings, said, flags=flags, lines=self.table.lines,
             texts=self.texts, headings=self.headings, **more,
         )  # fmt: skip
+
+
+def kept_in(files: Sequence[Path]) -> list[str]:
+    """Files of the current folder, as typed, that can keep what is stated of tables: none of that name is there.
+
+    The folder of the data may be read-only.
+    """
+    stems = [file.stem for file in files]
+    if len(set(stems)) < len(stems):
+        stems = [f"{file.resolve().parent.name}_{file.stem}" for file in files]
+    names = [f"{stem}.toml" for stem in stems]
+    if len(files) == 1:
+        free = (name for name in ("recording.toml", *names) if not Path(name).exists())
+        names = [next(free, f"{stems[0]}_stated.toml")]
+    return [shlex.quote(name) for name in names]
 
 
 _OWN = {"UNIT": "units", "PAIRS": "number"}

@@ -8,6 +8,7 @@ that the user states.
 from __future__ import annotations
 
 import os
+import shlex
 import traceback
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -22,6 +23,7 @@ from bemt.data import readers as importers
 from bemt.data.readers.cfd_run import KIND as RUN
 from bemt.data.readers.cfd_run import RunHead, RunToml
 from bemt.data.readers.marks import EXPORT
+from bemt.data.readers.recording import kept_in
 from bemt.data.readers.split import some
 from bemt.data.readers.uiuc import NO_SPEED
 from bemt.data.recordings import cfd_run
@@ -36,7 +38,7 @@ from bemt.data.recordings.adapt import (
 from bemt.data.recordings.cfd_files import PROGRAMS, cfd_files, other_than_loads
 from bemt.data.recordings.grid_study import merged, of_table
 from bemt.data.recordings.reduce import reduction
-from bemt.data.recordings.shown import INTERNAL, Imported, ImportedFile
+from bemt.data.recordings.shown import INTERNAL, Imported, ImportedFile, options_of
 from bemt.physics.dataset import Dataset
 from bemt.physics.dataset.channels import channel_fault
 
@@ -157,9 +159,11 @@ def as_stated(files: Sequence[Any], run: Mapping[str, Any]) -> list[Any]:
 
     if not run.get("zones") and all(hasattr(f, "columns") or is_measured(f) for f in files):
         told: list[Any] = [*(run.get(name) or [] for name in ("unit", "column", "sign")), run.get("pole_pairs")]
-        if not any(told) and run.get("rpm") is None:
+        ignore = run.get("ignore") or ()
+        if not any(told) and run.get("rpm") is None and not ignore:
             return list(files)
-        return [stated_frame(f, *told) if hasattr(f, "columns") else _stated(f, run.get("rpm"), *told) for f in files]
+        return [stated_frame(f, *told) if hasattr(f, "columns") else _stated(f, run.get("rpm"), *told, ignore)
+                for f in files]  # fmt: skip
     of_runs = {k: v for k, v in run.items() if k != "pole_pairs"}
     if len(of_runs) < len(run) and run["pole_pairs"]:
         raise InputError(Fault("", "--pole-pairs", f"{run['pole_pairs']} with these files", "tables of measurements"))
@@ -183,19 +187,27 @@ def is_measured(file: Any) -> bool:
 
 def _stated(
     file: str, rpm: float | None, unit: Sequence[str], column: Sequence[str], sign: Sequence[str],
-    pole_pairs: int | None,
+    pole_pairs: int | None = None, ignore: Sequence[str] = (),
 ) -> Dataset:  # fmt: skip
-    """A table of measurements as a recording.toml with these facts would read it."""
+    """A table of measurements as a recording.toml with these facts would read it.
+
+    Pole pairs and headings to ignore are stated to ``import`` alone: its next step is the file that keeps them.
+    """
     from bemt.data.readers.recording_toml import RecordingToml, joined
     from bemt.data.recordings.cfd_options import filled, recording_from
 
-    if unit or column or sign or pole_pairs:
-        made = RecordingToml.model_validate(recording_from(file, unit, column, sign, pole_pairs))
+    if unit or column or sign or pole_pairs or ignore:
+        made = RecordingToml.model_validate(recording_from(file, unit, column, sign, pole_pairs, ignore=ignore))
         record = _finished(joined(made, Path(file).parent, file), Choice())
     else:
         record = import_file(file)
     record = filled(record, rpm)
-    return replace(record, provenance={**record.provenance, "stated": file})
+    about = {**record.provenance, "stated": file}
+    if pole_pairs or ignore:
+        options = options_of({"unit": unit, "column": column, "sign": sign, "ignore": ignore,
+                              "pole-pairs": [pole_pairs] if pole_pairs else []})  # fmt: skip
+        about["step"] = f"bemt import {shlex.quote(file)} {' '.join(options)} --out {kept_in([Path(file)])[0]}"
+    return replace(record, provenance=about)
 
 
 def _study(run: RunToml, insist: bool) -> list[Dataset]:

@@ -209,6 +209,31 @@ def from_rest(when: Array, rests: Sequence[Rest], full_scale: Mapping[str, float
     return TareZero(value, u, tuple(notes))
 
 
+def tared(rec: Dataset, name: str) -> tuple[dict[str, Array], tuple[str, ...]]:
+    """Load cells of a recording row by row, (N,), less their zero at rest as `reduce` takes it; what was subtracted.
+
+    `rec` has the usual names; a run without a motor stop keeps its readings.
+    """
+    samples, _ = is_samples(rec)
+    found = from_samples(rec, name) if samples else from_rows(rec)
+    values = {key: rec.values[key].copy() for key in TARED if key in rec.values}
+    top = {key: float(np.nanmax(np.abs(v), initial=0.0)) for key, v in values.items()}
+    runs, notes = runs_of(rec), list[str]()
+    for run, rests in found.rests.items():
+        rows = np.flatnonzero(runs == run)
+        timed, t = _clock(rec, rows, Found())
+        if t is not None:
+            when = np.interp(rows, timed, t)
+        else:
+            when = np.arange(rows.size, dtype=float) if samples else rows.astype(float)
+        zero = from_rest(when, rests, top)
+        for key, v in zero.value.items():
+            if key in values:
+                values[key][rows] -= v
+        notes += [n for n in zero.notes if n.split(":")[0] in values]
+    return values, tuple(notes)
+
+
 @dataclass(frozen=True)
 class Point:
     """One steady point: means, standard uncertainties (uncorrelated part), rows, when, run, direction, flags."""

@@ -39,7 +39,7 @@ _GRID = 41  # points of the drawn band
 _MOVES = 0.02  # change of J over a recording from which it is drawn over J
 _ONE_SPEED = 0.03  # share by which speeds differ that are drawn as one
 _AROUND = 0.1  # share of its speed by which the band reaches beyond a single point
-_WIDE = 60  # characters in a line above the picture
+_WIDE, _NOTES_WIDE = 60, 80  # characters in a line above the picture, and below it
 _MARKS = (("o", canvas.BLACK), ("s", canvas.RED), ("^", canvas.GREEN), ("D", canvas.PURPLE))
 
 
@@ -95,7 +95,11 @@ class PredictionView:
                 "notes": list(self.notes)}  # fmt: skip
 
     def png(self) -> bytes:
-        """Draw it: one panel a channel, one above the other, legible at the width of a telephone."""
+        """The picture as PNG."""
+        return self.picture("png")
+
+    def picture(self, kind: str) -> bytes:
+        """Draw it, png, pdf or svg: one panel a channel, one above the other, legible at the width of a telephone."""
         import matplotlib
 
         with matplotlib.rc_context(canvas.STYLE):
@@ -106,16 +110,17 @@ class PredictionView:
             axes[-1, 0].set_xlabel(LABEL[self.over])
             axes[-1, 0].locator_params(axis="x", nbins=6)
             handles, labels = axes[0, 0].get_legend_handles_labels()
-            figure.legend(handles, labels, loc="outside lower center", ncols=2)
-            words = (self._title(), *self.notes[:2])
-            figure.suptitle("\n".join(line for w in words for line in textwrap.wrap(w, _WIDE)), fontsize=9)
-            return canvas.png(figure, canvas.DPI)
+            notes = "\n".join(line for note in self.notes[:2] for line in textwrap.wrap(note, _NOTES_WIDE))
+            figure.legend(handles, labels, loc="outside lower center", ncols=2, title=notes, title_fontsize=7)
+            figure.suptitle(self._title(), fontsize=9)
+            return canvas.drawn(figure, kind, canvas.DPI)
 
     def _title(self) -> str:
-        """What the picture shows, in a line."""
+        """The case, and what of the readings lies in its band, a line each."""
         found = [(_WORD[c], *self.inside(c)[:2]) for c in self.channels]
         counts = ", ".join(f"{n} of {total} {word}" for word, n, total in found if total)
-        return f"{self.case}: {counts} readings in the 95 % band" if counts else self.sentence
+        told = f"readings in the 95 % band: {counts}" if counts else "the model gives no result at these points"
+        return "\n".join([*textwrap.wrap(self.case, _WIDE), told])
 
     def _panel(self, axis: Any, channel: str) -> None:
         x, y, half = self.curve[self.over], self.curve[channel], self.curve.u[channel]

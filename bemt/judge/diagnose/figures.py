@@ -409,12 +409,17 @@ def first_picture(records: Sequence[Record], cases: Sequence[Case]) -> list[Pred
     """Put records beside their cases, one view a case; ``cases`` are one for all records, or one for each."""
     each = list(cases) * len(records) if len(cases) == 1 else list(cases)
     groups: dict[str, tuple[Case, list[Dataset]]] = {}
-    assumed = {str(c.path.resolve()) for r, c in zip(records, each, strict=True) if not r.air_recorded}
+    bare: dict[str, list[str]] = {}
     for record, case in zip(records, each, strict=True):
         groups.setdefault(str(case.path.resolve()), (case, []))[1].append(points_of(record))
+        bare.setdefault(str(case.path.resolve()), []).extend([] if record.air_recorded else [record.name])
     views = [against_band(case, points) for case, points in groups.values()]
-    told = {
-        key: f"No density recorded: {case.air().rho:.4g} kg/m³, that of the case." for key, (case, _) in groups.items()
-    }
-    return [replace(view, notes=(*([told[key]] if key in assumed else []), *view.notes))
+    told = {key: f"No density recorded{_of_some(bare[key], len(points))}: {case.air().rho:.4g} kg/m³, that of the case."
+            for key, (case, points) in groups.items() if bare[key]}  # fmt: skip
+    return [replace(view, notes=(*([told[key]] if key in told else []), *view.notes))
             for key, view in zip(groups, views, strict=True)]  # fmt: skip
+
+
+def _of_some(bare: Sequence[str], of: int) -> str:
+    """Which recordings have no density, where others have."""
+    return f" in {' and '.join(bare)}" if len(bare) < of else ""

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.base.gaussian.whitening import whitener
 from bemt.base.units import ZERO_CELSIUS, suffixes
+from bemt.data.readers.recording import kept_in
 from bemt.data.readers.recording_toml import QUANTITIES
 from bemt.data.recordings.shown import options_of
 from bemt.judge.compare.change_document import AIR_OF_BOTH, DAYS, title_of
@@ -103,8 +104,7 @@ class Given:
         paths = [Path(shlex.split(f)[0]) for f in self.recordings]
         if any(p.suffix == ".toml" for p in paths):
             return ()  # whose lines are to be changed by hand
-        names = ["recording.toml"] if len(paths) == 1 else [f"{path.stem}.toml" for path in paths]
-        files = [shlex.quote(p.with_name(n).as_posix()) for p, n in zip(paths, names, strict=True)]
+        files = kept_in(paths)
         imports = (f"bemt import {f} {told} --out {k}" for f, k in zip(self.recordings, files, strict=True))
         return *imports, replace(self, recordings=tuple(files), stated={}).command()
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from types import MappingProxyType
@@ -198,6 +198,10 @@ class Dataset:
     def __contains__(self, channel: object) -> bool:
         """Whether a channel exists."""
         return channel in self.values
+
+    def __iter__(self) -> Iterator[str]:
+        """Names of the channels, as `in` and ``[name]`` take them."""
+        return iter(self.values)
 
     def __repr__(self) -> str:
         """One-line summary; to_pandas() shows the numbers."""

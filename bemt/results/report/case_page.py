@@ -72,7 +72,7 @@ def _inputs(page: CasePage) -> Section:
     rows: list[Sequence[object]] = [
         ["rotational speed", num(c.rpm, 6), "rev/min"],
         ["airspeed", num(c.airspeed_m_s), "m/s"],
-        *([["full throttle", result.drive.text, ""]] if result.drive else []),
+        *([["drive", result.drive.text, ""]] if result.drive else []),
         ["density", num(c.density_kg_m3), "kg/m³"],
         ["temperature", num(c.temperature_C, 3), "°C"],
         ["diameter", num(c.diameter_m), "m"],

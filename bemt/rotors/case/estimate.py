@@ -180,7 +180,7 @@ def _label(label: str, blades: int | None) -> tuple[Designation | None, list[Fau
     try:
         return fresh.read_label(label, blades), []
     except InputError as error:
-        return None, list(error.faults)
+        return None, list(fresh.or_a_fan(error, label).faults)
 
 
 class EstimateInput(Documented):
@@ -235,7 +235,8 @@ class RotorEstimate(Dataset):
             row.insert(at, number_text(1e3 * thrust / KGF, 3))
         g = self.given
         kind = f", {g.blade_class.replace('_', ' ')}" if g.blade_class else ""
-        read = f"{g.label}: diameter {g.diameter_in:g} in, pitch {g.pitch_in:g} in, {g.blades} blades{kind}"
+        read = fresh.read_as(g.label, g.diameter_in, g.pitch_in)
+        read += f": diameter {g.diameter_in:g} in, pitch {g.pitch_in:g} in, {g.blades} blades{kind}"
         notes = ["± 68 and 95 %: the rotor itself; on a stand: what yours may show, ± 68 %"]
         if g.source:
             notes.append(f"as measured: {g.source}")

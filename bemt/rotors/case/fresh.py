@@ -101,6 +101,26 @@ def _case_for_label(path: str) -> Fault:
     return Fault("label", "", repr(path), "a label, such as 10x5", hint)
 
 
+def or_a_fan(error: InputError, label: object) -> InputError:
+    """Faults of a label with the command that begins a ducted fan, where the label holds one size, or none."""
+    if not isinstance(label, str) or is_path(label) or re.search(r"\d\D+\d", label):
+        return error
+    size = re.search(r"\d+(?:\.\d+)?\s*(?:mm|in)\b", label)
+    fan = f"A ducted fan? bemt new {size[0].replace(' ', '') if size else '70mm'} --fan, with its diameter"
+    return InputError([replace(f, hint=". ".join(filter(None, (f.hint.rstrip("."), fan)))) for f in error.faults])
+
+
+def read_as(label: str, diameter_in: float, pitch_in: float) -> str:
+    """A label, and how it was read where it writes its size in another way.
+
+    >>> read_as("10x47", 10.0, 4.7), read_as("APC 10 x 4.7SF", 10.0, 4.7)
+    ('10x47 read as 10x4.7', 'APC 10 x 4.7SF')
+    """
+    size = f"{diameter_in:g}x{pitch_in:g}"
+    plain = re.sub(r"\s*[x\u00d7*]\s*|\s+by\s+", "x", label.casefold())
+    return label if size in plain else f"{label} read as {size}"
+
+
 def read_label(label: str, blades: int | None = None) -> Designation:
     """What a label such as ``10x5`` or ``APC 8x4.5x3`` says, with the blades filled in: as told, else two."""
     if not isinstance(label, str):

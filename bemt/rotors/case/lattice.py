@@ -27,13 +27,20 @@ if TYPE_CHECKING:
 
 # Operating points that a caller asks of a case, checked.
 
+STOPPED, UNKNOWN = "stands still: no load is computed", "speed unknown: no load is computed"
+"""Flags of points that do not turn."""
 FAST = 150.0
 """Airspeed from which on a unit is asked about: declared [m/s]."""
 RPM_MAX, AIRSPEED_MAX = 300000.0, 300.0  # as in a case file [rev/min], [m/s]
 
 
-def conditions(case: Case, rpm: Any, airspeed_m_s: Any, J: Any) -> tuple[Array, Array]:
-    """Speeds [rev/min] and airspeeds [m/s] of the points that a caller means, by default those of the case."""
+def conditions(
+    case: Case, rpm: Any, airspeed_m_s: Any, J: Any, stopped: bool = False
+) -> tuple[Array, Array]:  # fmt: skip
+    """Speeds [rev/min] and airspeeds [m/s] of the points that a caller means, by default those of the case.
+
+    With `stopped` a point may stand still, and among others have no speed, NaN: :func:`solve` computes no loads there.
+    """
     faults = []
     if J is not None and airspeed_m_s is not None:
         faults.append(Fault("", "J, airspeed_m_s", "both", "one of them"))
@@ -43,12 +50,16 @@ def conditions(case: Case, rpm: Any, airspeed_m_s: Any, J: Any) -> tuple[Array, 
         if value is None:
             continue
         with gathered(faults):
-            found[name] = numbers(name, value)
+            found[name] = numbers(name, value, finite=not (stopped and name == "rpm"))
     n = found.get("rpm", np.asarray(case.rpm, dtype=float))
-    if np.any(n <= 0.0):
-        faults.append(Fault("", "rpm", f"{np.min(n):g}", "speeds above 0 rev/min", "Drop the sign?"))
+    if np.all(np.isnan(n)):
+        faults.append(Fault("", "rpm", "a number that is not finite", "finite numbers"))
+    elif np.any((n < 0.0) if stopped else (n <= 0.0)):
+        least = float(np.nanmin(n))
+        expected = f"speeds {'of 0 rev/min or more' if stopped else 'above 0 rev/min'}"
+        faults.append(Fault("", "rpm", f"{least:g}", expected, "Drop the sign?" if least < 0.0 else ""))
     elif np.any(n > RPM_MAX):
-        faults.append(Fault("", "rpm", f"{np.max(n):g}", f"up to {RPM_MAX:g} rev/min"))
+        faults.append(Fault("", "rpm", f"{np.nanmax(n):g}", f"up to {RPM_MAX:g} rev/min"))
     shapes = {name: value.shape for name, value in found.items()}
     try:
         np.broadcast_shapes(*shapes.values())
@@ -59,7 +70,7 @@ def conditions(case: Case, rpm: Any, airspeed_m_s: Any, J: Any) -> tuple[Array, 
     V = found.get("airspeed_m_s", np.asarray(case.airspeed_m_s, dtype=float))
     if "J" in found:
         V = found["J"] * n / 60.0 * case.diameter_m
-    if (fast := np.max(np.abs(V))) > AIRSPEED_MAX:
+    if (fast := np.max(np.abs(np.nan_to_num(V)))) > AIRSPEED_MAX:
         name, hint = ("J", "V = J n D") if "J" in found else ("airspeed_m_s", "km/h? Divide by 3.6")
         faults.append(Fault("", name, f"{fast:g} m/s", f"up to {AIRSPEED_MAX:g} m/s", hint))
     elif "airspeed_m_s" in found and fast > FAST:
@@ -102,7 +113,13 @@ def solve(
     case: Case, rpm: Array, airspeed_m_s: Array, density_kg_m3: float | None, bands: bool = True,
     angle_deg: Array | float | None = None,
 ) -> Dataset:  # fmt: skip
-    """Solve points [rev/min], [m/s], [deg] between wind and shaft, (P,), in one air [kg/m3], with bands and flags."""
+    """Solve points [rev/min], [m/s], [deg] between wind and shaft, (P,), in one air [kg/m3], with bands and flags.
+
+    A point that stands still, or whose speed is NaN, is NaN and flagged.
+    """
+    turning = rpm > 0.0
+    if not np.all(turning):
+        return _with_stopped(case, rpm, airspeed_m_s, density_kg_m3, bands, angle_deg)
     if case.angle_deg or np.any(0.0 if angle_deg is None else angle_deg):
         return propagate(case, rpm, airspeed_m_s, density_kg_m3, angle_deg=angle_deg, bands=bands).points
     if case.paired:
@@ -132,6 +149,33 @@ def solve(
     rough = np.any([_rough(u / n ** _POWERS.get(key, 0), at) for key, u in around.u.items()], axis=0)
     rough = np.flatnonzero(rough[cell] | (found.converged & np.isnan(found.u_thrust_N)))
     return _exact(case, found, rough, density_kg_m3) if rough.size else found
+
+
+def _with_stopped(
+    case: Case, rpm: Array, airspeed_m_s: Array, density_kg_m3: float | None, bands: bool,
+    angle_deg: Array | float | None,
+) -> Dataset:  # fmt: skip
+    """Points of which some do not turn: those are NaN, the others solved; the case's own speed where none turns."""
+    turning = rpm > 0.0
+    rows = np.flatnonzero(turning) if np.any(turning) else np.zeros(1, dtype=int)
+    angle = None if angle_deg is None else np.broadcast_to(angle_deg, rpm.shape)[rows]
+    n = np.where(turning, rpm, case.rpm)[rows]
+    found = solve(case, n, np.nan_to_num(airspeed_m_s[rows]), density_kg_m3, bands, angle)
+
+    def spread(part: Array) -> Array:
+        out = np.full(rpm.size, np.nan)
+        if np.any(turning):
+            out[rows] = part
+        return out
+
+    values = {key: spread(v) for key, v in found.values.items()}
+    values |= {"rpm": rpm, "airspeed_m_s": airspeed_m_s}
+    values["density_kg_m3"] = np.full(rpm.size, found["density_kg_m3"][0])
+    u_by = {origin: {key: spread(v) for key, v in part.items()} for origin, part in found.u_by.items()}
+    flags: list[tuple[str, ...]] = [(UNKNOWN if np.isnan(x) else STOPPED,) for x in rpm]
+    for row, words in zip(rows, found.flags if np.any(turning) else (), strict=False):
+        flags[row] = words
+    return replace(found, values=values, u={}, u_by=u_by, flags=tuple(flags), lines=())
 
 
 def _between(key: str, u: Array, n: Array, rpm: Array, at: NDArray[np.int64], share: Array) -> Array:

@@ -109,6 +109,10 @@ def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str], list
         size = f"diameter {1e3 * case.diameter_m:.5g} mm{whence}{at}, {case.get('rotor.blades')} blades"
         assumed.append(f"taken: {size}, hub {hub:.3g} mm, by the innermost station; yours: hub_ratio in case.toml")
     bare = wanted.label and not (wanted.stations or wanted.scan or wanted.fan or wanted.series)
+    if bare:
+        given = fresh.read_label(str(wanted.label), wanted.blades)
+        read = fresh.read_as(str(wanted.label), given.diameter_in, given.pitch_in)
+        notes += [read] if read != wanted.label else []
     kind = [line for line in [fresh.open_kind(str(wanted.label), wanted.blades)] if line] if bare else []
     return folder, sorted(files), [*assumed, *kind, *notes, *unused]
 
@@ -273,6 +277,10 @@ def _called(w: Wanted, text: str) -> str:
 
 def _label_text(w: Wanted, label: str) -> str:
     if not w.fan:
+        try:
+            fresh.read_label(label, w.blades)
+        except InputError as error:
+            raise fresh.or_a_fan(error, label) from None
         return fresh.label_text(label, w.blades, w.rpm, w.airspeed_m_s, w.family, w.motor, reading=w.reading)
     if w.diameter_mm is not None:
         return fresh.fan_text(w.diameter_mm * 1e-3, None, w.blades, w.rpm, w.motor)

@@ -27,7 +27,8 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of
 from bemt.data.readers.recording import FULL_THROTTLE
 from bemt.data.recordings import plateaus
-from bemt.data.recordings.channels import THROTTLE_IS_PULSE, pulse_of
+from bemt.data.recordings.channels import THROTTLE_IS_PULSE, named, pulse_of
+from bemt.data.recordings.points import tared
 from bemt.physics.dataset import Dataset, concat
 
 # From a recording to the points of a bench map: pulse width, thrust, rpm, current, power, voltage when steady.
@@ -76,6 +77,13 @@ def _command(got: Dataset, name: str, notes: list[str]) -> Array:
     raise InputError(Fault(name, "pulse_width_s", "no pulse width and no throttle", "a command per row", hint))
 
 
+def _without_zero(got: Dataset, name: str, thrust: Array) -> tuple[Array, tuple[str, ...]]:
+    """The thrust less the zero of the stand, and what was subtracted, as `bemt import` reads the recording."""
+    turned = named(replace(got, values={**got.values, "thrust_N": thrust}))
+    values, notes = tared(turned, name)
+    return values["thrust_N"], tuple(n for n in notes if n.startswith("thrust_N"))
+
+
 def points(got: Dataset, name: str = "", sign: int = 1, run: int = 0) -> Dataset:
     """Find the steady points of one recording."""
     notes: list[str] = []
@@ -84,7 +92,8 @@ def points(got: Dataset, name: str = "", sign: int = 1, run: int = 0) -> Dataset
     if thrust is None:
         hint = "Name its column and unit in a recording.toml"
         raise InputError(Fault(name, "thrust_N", "no thrust with a unit", "a channel of thrust", hint))
-    thrust = sign * thrust
+    thrust, zeros = _without_zero(got, name, sign * thrust)
+    notes += zeros
     rpm = _channel(got, "rpm", "optical_rpm", "electrical_rpm")
     if rpm is not None and _channel(got, "rpm", "optical_rpm") is None:
         notes.append("rpm is the electrical reading of the stand, with the pole pairs set in its software")

@@ -289,9 +289,9 @@ def _option_faults(thrust: float | None, voltage: float | None, nodes: int, name
 
 
 def _sources(path: Path, got: object) -> set[Path]:
-    """The file itself and the tables beside it that it names."""
+    """The file itself and the tables that it names."""
     names = got.file.split("+") if isinstance(got, Dataset) else []
-    beside = [path.parent / Path(name).name for name in names if name]
+    beside = [place for name in names if name for place in (Path(name), path.parent / name)]
     return {path.resolve(), *(p.resolve() for p in beside if p.is_file())}
 
 

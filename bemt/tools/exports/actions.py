@@ -80,7 +80,7 @@ def export(
     tip_round : float, optional
         Length of the rounded printed tip over the chord, 0.5 by default, 0.1 in a duct.
     hand : {"right", "left", "both"}, optional
-        Direction of rotation of the print; that of the case by default.
+        Direction of rotation; that of the case by default. Both: one print of each.
     sideslip_deg : float, optional
         Openfoam: angle between shaft and wind, 0 to 90; 0 by default. [deg]
     level : float, optional
@@ -136,7 +136,7 @@ def export(
     given |= {"domain": domain, "sector": sector, "turbulence": turbulence, "solver": solver}
     request = Print(
         None, nozzle_mm, trailing_edge_mm, tip_round, None, hub_diameter_mm, hub_height_mm, adapter, bore_mm,
-        recess_mm, hex_mm, hand,
+        recess_mm, hex_mm, hand if printable or hand == "both" else None,
     )  # fmt: skip
     if printable:
         request = Print(**{**vars(request), "min_thickness_mm": min_thickness_mm, "flare_mm": fillet_mm})
@@ -150,6 +150,7 @@ def export(
         made, refused = export_cases(
             os.fspath(case) if named else rotor_of(case).case, folder, wanted or ["stl"], unit,  # type: ignore[arg-type]
             fillet, least, given, tuple(dict.fromkeys(hold)), request if printable else None, progress,
+            None if printable else hand,
         )  # fmt: skip
     except OSError as error:
         raise InputError(system_fault(error)) from error

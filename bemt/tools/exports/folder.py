@@ -229,12 +229,13 @@ def _remove(out: Path, files: Mapping[str, str]) -> None:
 def export_cases(
     path: str | Case, out: str, formats: Sequence[str], unit: str = "mm", fillet_mm: float = 0.0,
     min_thickness_mm: float = 0.0, given: Mapping[str, Any] | None = None, hold: tuple[str, ...] = (),
-    printed: Print | None = None, progress: Callable[[str], None] | None = None,
+    printed: Print | None = None, progress: Callable[[str], None] | None = None, rotation: str | None = None,
 ) -> tuple[list[tuple[Manifest, Path]], list[InputError]]:  # fmt: skip
     """Write a case for its targets, or all cases of a folder, each into a folder of its own.
 
     `given` is the operating point (``rpm``, ``airspeed_m_s``) and the options of single targets
-    (:attr:`Export.options <bemt.tools.exports.base.Export.options>`); None is not given.
+    (:attr:`Export.options <bemt.tools.exports.base.Export.options>`); None is not given. `rotation` is ``right`` or
+    ``left`` instead of the cases' own.
 
     Returns manifests with their folders, and why cases or targets were refused. Faults of the options are raised before
     anything is written.
@@ -265,6 +266,7 @@ def export_cases(
     for case in cases:
         folder = Path(out) / case.name if len(paths) > 1 else Path(out)
         try:
+            case = case if rotation is None else case.replaced({"rotor.rotation": rotation})
             job = Job(case, rpm, airspeed, hold, unit, solid, printed, asked)
             made.append((export_case(job, folder, formats, progress), folder))
         except PartlyRefused as error:

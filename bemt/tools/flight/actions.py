@@ -97,11 +97,11 @@ class FlightsAnswer(Answered):
         rows = self.table()
         return csv_text(list(rows[0]), rows)
 
-    def figure(self, flight: int = 0) -> bytes:
-        """Picture of one flight, PNG."""
+    def figure(self, flight: int = 0, kind: str = "png") -> bytes:
+        """Picture of one flight: png, pdf or svg."""
         from bemt.tools.flight.picture import flight_picture
 
-        return flight_picture(self.flights[flight], self.mass_kg)
+        return flight_picture(self.flights[flight], self.mass_kg, kind)
 
 
 def layouts() -> dict[str, str]:
@@ -145,7 +145,7 @@ def fly(
     out_case : path
         Folder for the case with the rotor as these flights show it; needs the mass.
     picture : path
-        File for a picture of the first flight, PNG.
+        File for a picture of the first flight: .png, .pdf or .svg.
     out_csv : path
         File for a table, a row a flight.
 
@@ -162,12 +162,14 @@ def fly(
     """
     if layout == "list":
         return Told(layouts(), "\n".join(f"{name:<14} {places}" for name, places in layouts().items()))
+    from bemt.base.canvas import kind_of
     from bemt.base.given import number
 
     given = [logs] if isinstance(logs, str | os.PathLike) else list(logs)
     for name, mass in (("mass_kg", mass_kg), ("healthy_mass_kg", healthy_mass_kg)):
         if mass is not None:
             number(name, mass)
+    kind = "" if picture is None else kind_of(os.fspath(picture))
     refuse(_unusable(given, healthy, out_case, case))
     folder = any(Path(p).is_dir() for p in given)
     answers, refused = _answers(given, _grouped(healthy), folder, mass_kg, layout, healthy_mass_kg, healthy_day)
@@ -178,7 +180,7 @@ def fly(
         learnt, converged = _learn(answers, os.fspath(case or ""), os.fspath(out_case), mass_kg)
     out = FlightsAnswer(tuple(answers), tuple(refused), folder, learnt, converged, mass_kg)
     if picture is not None:
-        Path(picture).write_bytes(out.figure())
+        Path(picture).write_bytes(out.figure(kind=kind))
     if out_csv is not None:
         Path(out_csv).write_text(out.csv(), encoding="utf-8")
     return out

@@ -217,6 +217,8 @@ def _not_flown(log: FlightLog) -> FlightVerdict:
     why = "the log shows no flight with all motors running"
     if not log.rotors:
         why = f"no output of {f'any of the {log.stated_rotors}' if log.stated_rotors else 'the'} motors was logged"
+    elif log.airborne is not None and not np.any(log.airborne > 0.5):
+        why = "the vehicle stays on the ground or disarmed all along, by the autopilot's own record"
     step = "log a flight of 10 s or more with the commands of the motors (ArduPilot RCOU or RATE, PX4 " \
            "actuator_motors, a Crazyflie's motor.m1 to m4)"  # fmt: skip
     said = Decision("insufficient", (), NONE, 1.0, why)

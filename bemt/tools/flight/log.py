@@ -46,6 +46,7 @@ class FlightLog:
     rpm: Array | None = None  # (N, B) Speeds [rev/min]
     current: Array | None = None  # (N, B) Currents of the speed controllers [A]
     acceleration: Array | None = None  # (N, 3) Specific force in body axes, z up [m/s2]
+    airborne: Array | None = None  # (N,) Whether the autopilot holds the vehicle armed and off the ground: 1 or 0
     rates: Array | None = None  # (N, 3) Angular velocity in body axes, z up [rad/s]
     upright: Array | None = None  # (N,) Cosine of the tilt [1]
     axis: Array | None = None  # (N, 3) Unit vector of the thrust, in axes of the world, z up [1]
@@ -95,7 +96,7 @@ class FlightLog:
 
     @property
     def flying(self) -> NDArray[np.bool_]:
-        """Samples in the air, (N,): motors on, off the ground where a height is known, without the first moments."""
+        """Samples in the air, (N,): motors on, off the ground if a height or the autopilot tells, without the start."""
         drive = self.command if self.command is not None else self.rpm
         if drive is None and self.thrust is not None:
             drive = self.thrust[:, None]
@@ -110,6 +111,8 @@ class FlightLog:
             z = self.position[:, 2]
             # A log that does not begin near zero began in the air, or its zero is elsewhere: the lowest place counts.
             on &= z - (np.percentile(z, 1.0) if abs(z[0]) > _LOW_M else 0.0) > _LOW_M
+        if self.airborne is not None:
+            on &= self.airborne > 0.5
         starts = self.t[np.flatnonzero(on)[:1]]
         late = self.t >= starts[0] + _TRIM_S if starts.size else on
         return np.asarray(on & late, dtype=bool)
@@ -143,6 +146,15 @@ class Stretches(Generic[T]):
         while self._each * sum(len(p) for p in self.parts) > DENSE and sum(self._whole) > 2:
             for i in [k for k, whole in enumerate(self._whole) if whole][1::2]:
                 self.parts[i], self._whole[i] = self._thin(self.parts[i]), False
+
+
+def held(source: Source | None) -> Source | None:
+    """A state that is logged when it changes: it holds until the next message, so nothing lies between two."""
+    if source is None or not source[0].size:
+        return None
+    t, v = source
+    last = np.append(t[1:], t[-1] + 1.0) - 1e-6
+    return np.stack([t, last], axis=1).ravel(), np.repeat(v, 2)
 
 
 def scaled(source: Source | None, by: float | Array) -> Source | None:

@@ -9,16 +9,19 @@ from typing import Any
 import numpy as np
 
 from bemt.base import canvas
+from bemt.base.arrays import Array
 from bemt.base.canvas import BLUE, GREEN, ORANGE
 from bemt.base.units import G0
 from bemt.tools.flight.answer import FlightAnswer
-from bemt.tools.flight.text import headline
+from bemt.tools.flight.judge import FlightVerdict
+from bemt.tools.flight.text import headline, stated_size
 
 _LINES = canvas.CYCLE[:6]
+_CELL_S = 0.5  # length of a mean over time [s]
 
 
-def flight_picture(answer: FlightAnswer, mass_kg: float | None = None) -> bytes:
-    """Draw a flight, PNG; without a mass [kg] loads are per kilogram."""
+def flight_picture(answer: FlightAnswer, mass_kg: float | None = None, kind: str = "png") -> bytes:
+    """Draw a flight as png, pdf or svg; without a mass [kg] loads are per kilogram."""
     import matplotlib as mpl
 
     with mpl.rc_context({"font.size": 10.5, "axes.labelsize": 10.0, "legend.fontsize": 9.0, "axes.titlesize": 10.5}):
@@ -34,7 +37,7 @@ def flight_picture(answer: FlightAnswer, mass_kg: float | None = None) -> bytes:
         rotors = f"{answer.log.rotors} rotors" if answer.log.rotors else "no output of a motor"
         title = f"{answer.log.format}, {rotors}\n{textwrap.fill(headline(answer.judged), 88)}"
         figure.suptitle(title, fontsize=11.0)
-        return canvas.png(figure, dpi=130)
+        return canvas.drawn(figure, kind, dpi=130)
 
 
 def _empty(ax: Any, text: str) -> None:
@@ -62,6 +65,17 @@ def _flow(ax: Any, answer: FlightAnswer) -> None:
     ax.legend(frameon=False)
 
 
+def over_time(t: Array, x: Array) -> tuple[Array, Array]:
+    """Middles of cells of equal time, (M,), and means of columns, (N, B), in them, (M, B); NaN in a gap."""
+    cells = max(min(max(int((t[-1] - t[0]) / _CELL_S), 10), 300, t.size // 5), 1)
+    edges = np.linspace(t[0], t[-1], cells + 1)
+    cell = np.clip(np.searchsorted(edges, t, side="right") - 1, 0, cells - 1)
+    count = np.bincount(cell, minlength=cells)
+    sums = np.array([np.bincount(cell, column, minlength=cells) for column in x.T])
+    mean = np.divide(sums, count, out=np.full(sums.shape, np.nan), where=count > 0)
+    return 0.5 * (edges[1:] + edges[:-1]), mean.T
+
+
 def _drives(ax: Any, answer: FlightAnswer) -> None:
     log, on = answer.log, answer.log.flying
     drive = log.command if log.command is not None else log.rpm
@@ -69,8 +83,7 @@ def _drives(ax: Any, answer: FlightAnswer) -> None:
         _empty(ax, "no flight with motors running")
         return
     t, x = log.t[on], drive[on]
-    parts = np.array_split(np.arange(t.size), min(max(int((t[-1] - t[0]) / 0.5), 10), 300))
-    when, mean = np.array([t[p].mean() for p in parts]), np.array([x[p].mean(axis=0) for p in parts])
+    when, mean = over_time(t, x)
     share = 100 * (mean / mean.mean(axis=1, keepdims=True) - 1.0)
     for i in range(share.shape[1]):
         name = f"{i + 1}" if i else "motor 1"
@@ -118,6 +131,16 @@ def _thrust(ax: Any, answer: FlightAnswer, mass_kg: float | None) -> None:
     ax.legend(frameon=False)
 
 
+def _beside_others(rotors: int) -> float:
+    """Change of a drive against those of the other motors, over that of its share, which holds the motor itself."""
+    return rotors / max(rotors - 1, 1)
+
+
+def bars_of(judged: FlightVerdict) -> Array:
+    """Change of each motor's drive against those of the others, (B,) [1]."""
+    return _beside_others(judged.readings.size) * judged.readings
+
+
 def _balance(ax: Any, answer: FlightAnswer) -> None:
     j = answer.judged
     if not j.readings.size:
@@ -126,14 +149,20 @@ def _balance(ax: Any, answer: FlightAnswer) -> None:
     accused = {int(n) - 1 for e in j.said.effects for n in re.findall(r"\d+", e)}
     colours = [_LINES[i % len(_LINES)] for i in range(j.readings.size)]
     edges = [1.8 if i in accused else 0.0 for i in range(j.readings.size)]
-    ax.bar(np.arange(1, j.readings.size + 1), 100 * j.readings, color=colours, edgecolor="k", linewidth=edges)
+    bars = 100 * bars_of(j)
+    ax.bar(np.arange(1, bars.size + 1), bars, color=colours, edgecolor="k", linewidth=edges)
     if np.isfinite(j.scatter):
-        ax.axhspan(-200 * j.scatter, 200 * j.scatter, color="0.5", alpha=0.2, lw=0,
+        two = 200 * _beside_others(bars.size) * j.scatter
+        ax.axhspan(-two, two, color="0.5", alpha=0.2, lw=0,
                    label="healthy flights (2 sd)" if j.given else "healthy vehicles (2 sd)")  # fmt: skip
-        ax.legend(frameon=False)
+    if (stated := stated_size(j)) is not None and len(accused) == 1:
+        ax.errorbar([min(accused) + 1], [100 * stated.size], [100 * stated.half], fmt="D", ms=5, color="k", capsize=4,
+                    label="stated above, with its 95 % band")  # fmt: skip
+    if ax.get_legend_handles_labels()[0]:
+        ax.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     ax.margins(y=0.2)
     ax.axhline(0.0, color="0.3", lw=0.8)
     ax.set_xticks(np.arange(1, j.readings.size + 1))
     ax.set_xlabel("motor")
-    against = "healthy flights" if np.isfinite(j.total) else "the other rotors"
-    ax.set_ylabel(f"drive, against {against} [%]")
+    change = ",\nchange from healthy flights" if np.isfinite(j.total) else ""
+    ax.set_ylabel(f"drive, against the other motors{change} [%]")

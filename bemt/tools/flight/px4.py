@@ -24,16 +24,18 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, needs
 from bemt.tools.flight.layout import LAYOUTS, layout_of, layout_text, mixed
-from bemt.tools.flight.log import SPARSE, FlightLog, Source, Stretches, column, joined, scaled, thrust_axis
+from bemt.tools.flight.log import SPARSE, FlightLog, Source, Stretches, column, held, joined, scaled, thrust_axis
 
 KIND = "PX4 ULog"
 _TOPICS = ["actuator_motors", "actuator_outputs", "esc_status", "sensor_combined", "vehicle_attitude",
            "vehicle_local_position", "battery_status", "sensor_accel_fifo", "actuator_controls_0",
-           "vehicle_torque_setpoint", "vehicle_thrust_setpoint", "vehicle_gps_position", "sensor_gps"]  # fmt: skip
+           "vehicle_torque_setpoint", "vehicle_thrust_setpoint", "vehicle_gps_position", "sensor_gps",
+           "vehicle_land_detected", "vehicle_status"]  # fmt: skip
 _STRETCH = 16_384  # samples
 _KINDS, _DATA, _SYNC = b"BFIMPQADLSOCR", ord("D"), bytes.fromhex("2f731320250cbb12")
 _AIRFRAMES = {5: "quad-plus", 6: "hexa-x", 7: "hexa-plus", 8: "octo-x", 9: "octo-plus", 12: "x8"}  # by thousands
 _X = float(np.sqrt(0.5))
+_ARMED = 2  # arming_state (vehicle_status.msg)
 _AXIS = np.array([-1.0, 1.0, 1.0])  # the thrust is along -z of the body; NED to north-west-up
 _FLIP = np.array([1.0, -1.0, -1.0])  # forward-right-down to forward-left-up; north-east-down to north-west-up
 
@@ -173,6 +175,7 @@ def _made(name: str, found: Any, topics: Mapping[int, _Messages], damaged: bool)
         "position": scaled(take("vehicle_local_position", list("xyz")), _FLIP),
         "voltage": column(take("battery_status", ["voltage_v"]), 0),
         "battery_current": column(take("battery_status", ["current_a"]), 0), "thrust": thrust, "torque": torque,
+        "airborne": _airborne(take),
     }  # fmt: skip
     main = next((k for k in ("command", "rpm", "acceleration") if sources[k]), "thrust")
     kept = {k: params[k] for k in ("THR_MDL_FAC", "MPC_THR_HOVER") if np.isfinite(params.get(k, np.nan))}
@@ -224,6 +227,14 @@ def _demand(take: Callable[[str, list[str]], Source | None]) -> tuple[Source | N
     xyz = [f"xyz[{i}]" for i in range(3)]
     thrust, torque = take("vehicle_thrust_setpoint", xyz), take("vehicle_torque_setpoint", xyz)
     return (thrust[0], -thrust[1][:, 2]) if thrust else None, torque
+
+
+def _airborne(take: Callable[[str, list[str]], Source | None]) -> Source | None:
+    """Whether the vehicle is off the ground by its land detector, which a disarmed one never is; else whether armed."""
+    landed, state = take("vehicle_land_detected", ["landed"]), take("vehicle_status", ["arming_state"])
+    if landed is not None:
+        return held((landed[0], 1.0 - landed[1][:, 0]))
+    return None if state is None else held((state[0], (state[1][:, 0] == _ARMED).astype(float)))
 
 
 def _date(take: Callable[[str, list[str]], Source | None]) -> str:

@@ -10,6 +10,7 @@ from bemt.base.tables import number_text
 from bemt.judge.loss import Decision
 from bemt.tools.flight.answer import FlightAnswer
 from bemt.tools.flight.balance import BLADE, WEIGHT, WIDE
+from bemt.tools.flight.change import FlightEvidence
 from bemt.tools.flight.identify import Constant
 from bemt.tools.flight.judge import FlightVerdict
 from bemt.tools.flight.log import SpeedSensor
@@ -356,13 +357,17 @@ def _number(c: Constant) -> str:
     return f"{number_text(c.value, 4)} ± {number_text(c.half, 2)} {'' if c.unit == '1' else c.unit}".rstrip()
 
 
+def stated_size(j: FlightVerdict) -> FlightEvidence | None:
+    """Size of what is said, with its 95 % half width; None where none is stated."""
+    found = j.found.get(j.said.leading)
+    sized = not j.in_flight and any(i in j.said.leading for i in j.said.effects)
+    return found if found is not None and found.size and sized else None
+
+
 def headline(j: FlightVerdict) -> str:
     """What is wrong, without the reason."""
-    said = j.said
-    found = j.found.get(said.leading)
-    size = ""
-    sized = not j.in_flight and any(i in said.leading for i in said.effects)
-    if found is not None and found.size and sized:
+    said, found, size = j.said, stated_size(j), ""
+    if found is not None:
         size = f" ({100 * found.size:+.0f} ± {100 * found.half:.0f} % drive)"
     if said.beside:
         return f"Cause found: {said.effects[0]}{size}; possibly also {' or '.join(said.effects[1:])}"
