@@ -162,7 +162,7 @@ def as_stated(files: Sequence[Any], run: Mapping[str, Any]) -> list[Any]:
         ignore = run.get("ignore") or ()
         if not any(told) and run.get("rpm") is None and not ignore:
             return list(files)
-        return [stated_frame(f, *told) if hasattr(f, "columns") else _stated(f, run.get("rpm"), *told, ignore)
+        return [stated_frame(f, *told) if hasattr(f, "columns") else _stated(f, run.get("rpm"), *told, ignore=ignore)
                 for f in files]  # fmt: skip
     of_runs = {k: v for k, v in run.items() if k != "pole_pairs"}
     if len(of_runs) < len(run) and run["pole_pairs"]:
