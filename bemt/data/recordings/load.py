@@ -158,12 +158,13 @@ def as_stated(files: Sequence[Any], run: Mapping[str, Any]) -> list[Any]:
     from bemt.data.recordings.cfd_options import run_from, stated_frame
 
     if not run.get("zones") and all(hasattr(f, "columns") or is_measured(f) for f in files):
-        told: list[Any] = [*(run.get(name) or [] for name in ("unit", "column", "sign")), run.get("pole_pairs")]
-        ignore = run.get("ignore") or ()
-        if not any(told) and run.get("rpm") is None and not ignore:
+        told: list[list[str]] = [run.get(name) or [] for name in ("unit", "column", "sign", "ignore")]
+        pairs = run.get("pole_pairs")
+        if not any(told) and run.get("rpm") is None and not pairs:
             return list(files)
-        return [stated_frame(f, *told) if hasattr(f, "columns") else _stated(f, run.get("rpm"), *told, ignore=ignore)
-                for f in files]  # fmt: skip
+        unit, column, sign, ignore = told
+        return [stated_frame(f, unit, column, sign, pairs) if hasattr(f, "columns")
+                else _stated(f, run.get("rpm"), unit, column, sign, pairs, ignore) for f in files]  # fmt: skip
     of_runs = {k: v for k, v in run.items() if k != "pole_pairs"}
     if len(of_runs) < len(run) and run["pole_pairs"]:
         raise InputError(Fault("", "--pole-pairs", f"{run['pole_pairs']} with these files", "tables of measurements"))
