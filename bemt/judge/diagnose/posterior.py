@@ -20,10 +20,9 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.base.gaussian.evidence import log_sum, shares
 from bemt.base.gaussian.whitening import conditional
-from bemt.judge.diagnose import form, knowledge, noise
+from bemt.judge.diagnose import form, knowledge, noise, record
 from bemt.judge.diagnose.form import State
 from bemt.judge.diagnose.other_rotor import Another
-from bemt.judge.diagnose.record import CHANNELS
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation
 from bemt.physics import effects
 from bemt.physics.effects import base as effect_base
@@ -221,7 +220,9 @@ def _counts(problem: Problem, rows: NDArray[np.bool_], changes: Array) -> NDArra
     Loads grow with the square of the speed: half of what counts in loads counts in the speed at a pulse width.
     """
     channel = problem.channel[rows]
-    share = np.abs(changes) / (problem.scale[rows] * np.where(channel == CHANNELS.index("rpm"), 0.5, 1.0))[:, None]
+    share = (
+        np.abs(changes) / (problem.scale[rows] * np.where(channel == record.CHANNELS.index("rpm"), 0.5, 1.0))[:, None]
+    )
     there = share > _TOUCHED * LEAST
     out = np.zeros(share.shape[1], dtype=bool)
     for c in np.unique(channel):
