@@ -99,7 +99,7 @@ def sniff(head: bytes | str) -> bool:
     known = {c for c in map(slice_heading, cells) if c}
     section = {"cl", "cd"} <= {c.lower() for c in cells}
     at = {k[0] for k in known if isinstance(k, tuple)}
-    return bool(at & {"r", "r/R"}) and bool(at & {*LOADS}) or "r" in at and (len(known) > 1 or section)
+    return bool(at & {"r", "r/R"}) and bool(at & {*LOADS}) or "r" in at and (len(known - {("r/R", 1.0)}) > 1 or section)
 
 
 def _per_length(dimension: str, text: str) -> float:

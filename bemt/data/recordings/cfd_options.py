@@ -355,7 +355,7 @@ class _Measured:
                 return
             facts["column"] = named[0]
         text, dimension = str(facts["column"]), CHANNELS[quantity]
-        found = heading(text).unit or heading(re.sub(r"^[^(\[]*", f"{quantity} ", text)).unit
+        found = heading(text).unit or heading(re.sub(r"^[^(\[]*(?=[(\[])", f"{quantity} ", text)).unit
         if "unit" not in facts:
             if found is None or found.suffix not in units.UNITS or found.dimension != dimension:
                 expected = f"--unit {quantity}= {' or '.join(units.suffixes(dimension))}"
