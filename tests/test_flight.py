@@ -231,6 +231,8 @@ def test_other_rotors_are_refused(flights: Path) -> None:
     eight = replace(log, command=np.ones((log.t.size, 8)), rpm=None)
     with pytest.raises(InputError):
         answer_on(log, [eight])
+    with pytest.raises(InputError, match="a log of another"):
+        answer_on(log, [replace(log, format="another")])
 
 
 def betaflight(rotors: int = 4) -> str:

@@ -154,7 +154,7 @@ def answer_on(
 
     Masses include the battery [kg]; that of the healthy flights gives the mass of this one where it is not stated.
     `stated_days` and `day` are as :func:`bemt.tools.flight.repeat.sessions` takes them. InputError when logs have
-    another number of rotors, or the layout (as :func:`bemt.tools.flight.layout.layout_of` takes it) does not fit, or a
+    another number of rotors or are of another autopilot, or the layout (as :func:`bemt.tools.flight.layout.layout_of` takes it) does not fit, or a
     mass cannot have flown.
     """
     _refuse_unlike(log, healthy, mass_kg, healthy_mass_kg)
@@ -206,6 +206,10 @@ def _refuse_unlike(
     if log.rotors and others:
         expected = f"{log.rotors} rotors and the same channels as {log.file}"
         raise InputError([Fault(h.file, "", f"{h.rotors} rotors", expected) for h in others])
+    if strange := [h for h in healthy if h.format != log.format]:
+        expected = f"a log of {log.format}, as {log.file}"
+        raise InputError([Fault(h.file, "", f"a log of {h.format}", expected, "Healthy flights are of the same vehicle")
+                          for h in strange])  # fmt: skip
     faults = mass_faults(log, mass_kg, "--mass-kg")
     for h in healthy:
         faults = faults or mass_faults(h, healthy_mass_kg, "--healthy-mass-kg")
