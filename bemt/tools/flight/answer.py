@@ -154,8 +154,8 @@ def answer_on(
 
     Masses include the battery [kg]; that of the healthy flights gives the mass of this one where it is not stated.
     `stated_days` and `day` are as :func:`bemt.tools.flight.repeat.sessions` takes them. InputError when logs have
-    another number of rotors or are of another autopilot, or the layout (as :func:`bemt.tools.flight.layout.layout_of` takes it) does not fit, or a
-    mass cannot have flown.
+    another number of rotors or are of another autopilot, or the layout (as
+    :func:`bemt.tools.flight.layout.layout_of` takes it) does not fit, or a mass cannot have flown.
     """
     _refuse_unlike(log, healthy, mass_kg, healthy_mass_kg)
     log = checked(replace(log, layout=layout or log.layout))
