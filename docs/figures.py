@@ -131,6 +131,11 @@ def wilson(hits: int, n: int, z: float = 1.96) -> tuple[float, float]:
     return 100.0 * (p + q / 2 - half) / (1 + q), 100.0 * (p + q / 2 + half) / (1 + q)
 
 
+def third(text: str) -> list[int]:
+    """Right and all claims of the run after the two of one code."""
+    return [int(v) for v in re.findall(r"had (\d+) of (\d+) claims right", text)[0]]
+
+
 def real_claims(text: str) -> list[int]:
     """Right and all claims on real recordings, of every kind of this version's table."""
     rows = re.findall(r"^\| ([^|]+) \| \d+ \| ([-\d]+) \| ([-\d]+) \|.*\| (\d+) \|$", text, re.MULTILINE)
@@ -203,6 +208,7 @@ FIGURES = (
     Figure(README, "the 68 % band holds # to # % of left-out families' points", LEFT_OUT, _coverage("unseen", "68")),
     Figure(README, "# of # claims were right (# %)", PROOF,
            lambda t: [*claims(t)[:2], 100.0 * claims(t)[0] / claims(t)[1]]),
+    Figure(README, "in a third # of #", PROOF, lambda t: third(t)),
     Figure(README, "on real recordings # of #", PROOF, lambda t: real_claims(t)),
     Figure(README, "runs of # simulated tests", "reports/proof/proof.json", lambda d: [d["items"]]),
     Figure(README, "# to # % low in flight", CALIBRATION, _k1k2_low),
@@ -253,10 +259,11 @@ FIGURES = (
     Figure(BELIEVE, "In flight it is # to # % low", CALIBRATION, _k1k2_low),
     Figure(BELIEVE, "on the ducted fan it gives # N for # N", FAN, lambda d: [_fan(d)["k1k2"], _fan(d)["cfd"]]),
     Figure(BELIEVE, "On real recordings # of # claims were right", PROOF, lambda t: real_claims(t)),
+    Figure(BELIEVE, "A third had # of #", PROOF, lambda t: third(t)),
     Figure(BELIEVE, "two runs of # simulated items", "reports/proof/proof.json", lambda d: [d["items"]]),
     Figure(BELIEVE, "# of # claims were right: # %, 95 % interval # to # %", PROOF,
            lambda t: [*claims(t)[:2], 100.0 * claims(t)[0] / claims(t)[1], *wilson(*claims(t)[:2])]),
-    Figure(BELIEVE, "Of the visible causes of the last # % were claimed with a reference run, # % without one",
+    Figure(BELIEVE, "Of the visible causes of the second # % were claimed with a reference run, # % without one",
            "reports/proof/proof.json",
            lambda d: [100.0 * _score(f"claims on visible, {w} a reference")(d)[0] for w in ("with", "without")]),
     Figure(BELIEVE, "# of # items without a cause got a name", PROOF,
