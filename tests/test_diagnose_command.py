@@ -587,14 +587,13 @@ def test_the_improved_case_of_a_label_is_that_of_the_label(tmp_path: Path) -> No
     assert "pitch_offset" in [e.id for e in prepare_case(load_case(tmp_path / "out")).effects]
 
 
-def test_a_unit_that_is_named_is_stated_next(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The next command is not the same again: it keeps the unit in the current folder, and diagnoses that."""
-    monkeypatch.chdir(tmp_path)
+def test_a_unit_that_is_named_is_stated_next(tmp_path: Path) -> None:
+    """The next command is not the same again: it keeps the unit beside the table, and diagnoses that."""
     rows = bemt.propeller("12x6").solve(np.linspace(3000, 6000, 7), bands=False)
     table = "\n".join(f"{n:.0f},{T:.4f},{100 * Q:.5f}" for n, T, Q in
                       zip(rows.rpm, rows.thrust_N, rows.torque_Nm, strict=True))  # fmt: skip
     (tmp_path / "log.csv").write_text(f"rpm,thrust N,torque N m\n{table}\n")
-    text, kept = bemt.diagnose(tmp_path / "log.csv", "12x6").text, "recording.toml"
+    text, kept = bemt.diagnose(tmp_path / "log.csv", "12x6").text, (tmp_path / "recording.toml").as_posix()
     assert f"--unit torque=Ncm --out {kept}" in text and f"bemt diagnose {kept} --case 12x6" in text
 
 

@@ -339,11 +339,8 @@ def test_a_unit_is_taken_by_a_heading_or_a_quantity_in_any_case(tmp_path: Path, 
     assert main(["import", str(file), "--unit", told.replace("=g", "=parsec")]) == 2
 
 
-def test_what_needs_no_action_has_a_mark_of_its_own(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:  # fmt: skip
+def test_what_needs_no_action_has_a_mark_of_its_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A sound recording has no exclamation mark; one without the unit of its thrust is not to be diagnosed yet."""
-    monkeypatch.chdir(tmp_path)
     file = tmp_path / "good.csv"
     scatter = np.random.default_rng(1).normal(1.0, 0.01, (11, 5))
     rows = [(1200 + 60 * k, 6e-10 * n**2 * a, 4e-9 * n**2 * b, 16.0 * c, 1.0 + 6e-8 * n**2 * d, n, n * (0.999 + 0.001 * e))

@@ -166,11 +166,9 @@ def test_a_table_of_a_stranger_is_read(name: str, tmp_path: Path) -> None:
     ("Drehzahl;Schub;Drehmoment\n" + _rows(SPEEDS, THRUST, TORQUE, mark=";", decimal=","), ("U/min", "N", "Nm")),
 ])  # fmt: skip
 def test_the_command_that_a_hint_names_gives_the_right_numbers(
-    text: str, units: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
+    text: str, units: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Only the word UNIT is the user's to replace; with it left there, nothing is written."""
-    monkeypatch.chdir(tmp_path)
     (tmp_path / "t.csv").write_text(text)
     (step,) = (
         found[0] for note in import_file(tmp_path / "t.csv").notes if (found := re.search(r"bemt import .*", note))

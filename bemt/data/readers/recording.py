@@ -368,7 +368,7 @@ class Builder:
         asked = _asked(self.unitless, self.channels)
         if asks := [*self.asks, *asked.values()]:
             file = Path(self.table.source.name)
-            step = f"bemt import {shlex.quote(file.as_posix())} {' '.join(asks)} --out {kept_in([file])[0]}"
+            step = f"bemt import {shlex.quote(file.as_posix())} {' '.join(asks)} --out {kept_beside([file])[0]}"
             own = [f"your {what} in place of {mark}" for mark, what in _OWN.items() if mark in step]
             self.warnings.append(f"in one step, with {' and '.join(own)}: {step}" if own else step)
             if self.asks or _NEEDED & asked.keys():
@@ -382,19 +382,14 @@ class Builder:
         )  # fmt: skip
 
 
-def kept_in(files: Sequence[Path]) -> list[str]:
-    """Files of the current folder, as typed, that can keep what is stated of tables: none of that name is there.
-
-    The folder of the data may be read-only.
-    """
-    stems = [file.stem for file in files]
-    if len(set(stems)) < len(stems):
-        stems = [f"{file.resolve().parent.name}_{file.stem}" for file in files]
-    names = [f"{stem}.toml" for stem in stems]
-    if len(files) == 1:
-        free = (name for name in ("recording.toml", *names) if not Path(name).exists())
-        names = [next(free, f"{stems[0]}_stated.toml")]
-    return [shlex.quote(name) for name in names]
+def kept_beside(tables: Sequence[Path]) -> list[str]:
+    """Files, as typed, that can keep what is stated of tables: beside each, and of a name that is free."""
+    out = []
+    for table in tables:
+        stems = ("recording", table.stem) if len(tables) == 1 else (table.stem,)
+        places = [table.with_name(f"{stem}.toml") for stem in stems]
+        out.append(next((p for p in places if not p.exists()), table.with_name(f"{table.stem}_stated.toml")))
+    return [shlex.quote(p.as_posix()) for p in out]
 
 
 _OWN = {"UNIT": "units", "PAIRS": "number"}

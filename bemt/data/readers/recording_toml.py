@@ -17,7 +17,6 @@ from pydantic import create_model
 
 from bemt.base import units
 from bemt.base.errors import Fault, InputError, gathered, refuse
-from bemt.base.packed import part_of
 from bemt.base.toml import Table, entry, shown, validated
 from bemt.base.toml_text import Collector, load_toml
 from bemt.data.readers import head_text, load_text
@@ -79,7 +78,7 @@ class RecordingHead(Table):
     """[recording]: the tables and their format."""
 
     file: str | tuple[str, ...] = entry(
-        "table, by its path from this file, or several in the order of the runs", required=True
+        "table in the folder of this file, or several in the order of the runs", required=True
     )
     session: str | None = entry("name of the session; its runs share zero and gain")
     remark: str | None = entry("anything")
@@ -99,10 +98,10 @@ class RecordingHead(Table):
         return (self.file,) if isinstance(self.file, str) else self.file
 
     def rules(self) -> Iterable[tuple[str, ...]]:
-        """Tables are named from this file on, so that both may move."""
+        """Tables lie beside this file."""
         for name in self.files:
-            if Path(name).is_absolute():
-                yield "file", repr(name), "the path of a table from this file on"
+            if Path(name).is_absolute() or ".." in Path(name).parts:
+                yield "file", repr(name), "the name of a file in the same folder"
 
 
 class _Constants(Table):
@@ -235,11 +234,8 @@ def joined(made: RecordingToml, folder: Path, file: str) -> Dataset:
     runs: list[Dataset] = []
     faults: list[Fault] = []
     for name in head.files:
-        path = folder / name
         with gathered(faults):
-            if Path(name).name != name and not Path(part_of(path)[0]).exists():
-                raise InputError(Fault(file, "recording.file", repr(name), "the path of a table from this file on"))
-            runs.append(_run(file, path, made))
+            runs.append(_run(file, folder / name, made))
     refuse(faults)
     joined = _join(runs, head.files)
     warnings = list(joined.notes)

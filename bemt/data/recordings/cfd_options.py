@@ -379,7 +379,7 @@ def write_recording(
     pole_pairs: int | None = None, density_kg_m3: float | None = None, ignore: Sequence[str] = (),
     rpm: float | None = None, airspeed_m_s: float | None = None,
 ) -> Path:  # fmt: skip
-    """Write a recording.toml of a table of measurements, which it names from its own folder on; all faults at once.
+    """Write a recording.toml beside a table of measurements, in the same folder; all faults of the options at once.
 
     `unit` ``NAME=UNIT``, of a quantity or a heading; `column` ``QUANTITY=HEADING``; `sign` ``QUANTITY=-1``;
     `pole_pairs` of a speed that counts electrical revolutions; density; `ignore` headings; `rpm` and airspeed
@@ -387,11 +387,12 @@ def write_recording(
     """
     path = Path(out) if out.endswith(".toml") else Path(out) / "recording.toml"
     faults: list[Fault] = []
+    if path.resolve().parent != Path(file).resolve().parent:
+        faults.append(Fault("", "--out", out, f"a file in the folder of {Path(file).name}", "Both stay together"))
     if path.exists():
         faults.append(Fault(path.as_posix(), "", "a file that exists", "a new name", "Add the lines to it by hand"))
     document = recording_from(file, unit, column, sign, pole_pairs, density_kg_m3, faults, ignore,
                               rpm, airspeed_m_s)  # fmt: skip
-    document["recording"]["file"] = Path(os.path.relpath(Path(file).resolve(), path.resolve().parent)).as_posix()
     write_atomic(path, toml_text(document, "Written by bemt import. Give this file in place of the table."))
     return path
 

@@ -23,7 +23,7 @@ from bemt.data import readers as importers
 from bemt.data.readers.cfd_run import KIND as RUN
 from bemt.data.readers.cfd_run import RunHead, RunToml
 from bemt.data.readers.marks import EXPORT
-from bemt.data.readers.recording import kept_in
+from bemt.data.readers.recording import kept_beside
 from bemt.data.readers.split import some
 from bemt.data.readers.uiuc import NO_SPEED
 from bemt.data.recordings import cfd_run
@@ -207,7 +207,7 @@ def _stated(
     if pole_pairs or ignore:
         options = options_of({"unit": unit, "column": column, "sign": sign, "ignore": ignore,
                               "pole-pairs": [pole_pairs] if pole_pairs else []})  # fmt: skip
-        about["step"] = f"bemt import {shlex.quote(file)} {' '.join(options)} --out {kept_in([Path(file)])[0]}"
+        about["step"] = f"bemt import {shlex.quote(file)} {' '.join(options)} --out {kept_beside([Path(file)])[0]}"
     return replace(record, provenance=about)
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.base.gaussian.whitening import whitener
 from bemt.base.units import ZERO_CELSIUS, suffixes
-from bemt.data.readers.recording import kept_in
+from bemt.data.readers.recording import kept_beside
 from bemt.data.readers.recording_toml import QUANTITIES
 from bemt.data.recordings.shown import options_of
 from bemt.judge.compare.change_document import AIR_OF_BOTH, DAYS, title_of
@@ -104,7 +104,7 @@ class Given:
         paths = [Path(shlex.split(f)[0]) for f in self.recordings]
         if any(p.suffix == ".toml" for p in paths):
             return ()  # whose lines are to be changed by hand
-        files = kept_in(paths)
+        files = kept_beside(paths)
         imports = (f"bemt import {f} {told} --out {k}" for f, k in zip(self.recordings, files, strict=True))
         return *imports, replace(self, recordings=tuple(files), stated={}).command()
 
