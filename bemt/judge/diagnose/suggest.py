@@ -26,7 +26,6 @@ from bemt.judge.diagnose.problem import Part, Problem
 from bemt.judge.diagnose.record import CHANNELS, STILL, Record
 from bemt.judge.diagnose.repeats import conditions
 from bemt.judge.diagnose.signatures import actual_unit, effect_of
-from bemt.judge.explanation import Explanation
 from bemt.judge.loss import minutes
 from bemt.physics import effects
 from bemt.physics.air import R_DRY
@@ -67,7 +66,6 @@ _SLOWEST = 0.2
 _ENOUGH = ALIKE
 # A run is worth its time if it takes away this much doubt; no explanation counts less than the least.
 _WORTH, _LEAST = 0.02, 1e-6
-_CELLS = ("thrust_gain", "torque_gain")
 
 
 @dataclass(frozen=True)
@@ -409,15 +407,14 @@ def suggest(found: Evidence, rivals: Sequence[Rival], unknown: float = 0.0, refe
     # where no run is able to, one that tells only the others apart is better than nothing
     instead = looked or max(worth, key=lambda c: c.gain / c.minutes, default=None)
     if able and not (looked and certain):
-        by_hand = _cells_first(instead, found) if able[0].kind == "reference" else None
-        other = next((c for c in able if c.kind != able[0].kind), by_hand)
+        other = next((c for c in able if c.kind != able[0].kind), instead if able[0].kind == "reference" else None)
         return replace(able[0], otherwise=other)
     if looked:
         return replace(looked, before=before, after=before)
     if certain:
         return Suggestion("no further run is needed; none would tell more", (), (), before, before, "")
     if reference and not _referenced(found):
-        return replace(choices[-1], otherwise=_cells_first(instead, found))
+        return replace(choices[-1], otherwise=instead)
     nothing = "no run that this stand can make separates them; the same points once more would not, either"
     return instead or Suggestion(nothing, (), (), before, before, "")
 
@@ -440,22 +437,6 @@ def look(names: Sequence[str], record: Record) -> Suggestion | None:
     check, aim, name = min(aims, key=lambda one: (known[one[2]].evident, known[one[2]].check_minutes))
     return Suggestion(f"to {aim} {title_of(name)}, {check}", (), (), 0.0, 0.0, "look", checks=name,
                       minutes=known[name].check_minutes)  # fmt: skip
-
-
-def _cells_first(instead: Suggestion | None, found: Evidence) -> Suggestion | None:
-    """A check by hand with that of a cell whose gain may be it as well, before it: the stand comes before the rotor."""
-    if instead is None or instead.kind != "look":
-        return instead
-    known = effects.catalogue()
-    gains = [i for i in _CELLS if found.probability.get(Explanation.of(i), 0.0) >= _WORTH and i != instead.checks]
-    if not gains or known[instead.checks].kind == "stand":
-        return instead
-    cell = known[gains[0]]
-    told = f"to rule out {title_of(gains[0])}, {cell.check}"
-    other = "torque_Nm" if cell.sensor == "thrust_N" else "thrust_N"
-    if other not in found.problem.parts[0].record.measured:
-        told += f", or record the {other.split('_')[0]}, which it leaves as it is"
-    return replace(instead, text=f"{told}; {instead.text}", minutes=instead.minutes + cell.check_minutes)
 
 
 def correction(names: Sequence[str], settings: Mapping[str, Mapping[str, Any]], record: Record) -> Suggestion | None:
