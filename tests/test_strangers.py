@@ -332,7 +332,7 @@ def test_a_lone_point_among_decimal_commas_is_refused_with_its_place(tmp_path: P
     file.write_text(text.format("5,910"))
     read = named(import_file(file))
     assert read.rpm.tolist() == [4000.0, 5000.0, 6000.0, 7000.0] and read.thrust_N[2] == 5.91
-    assert read["power_W"].tolist() == [985.5, 1234.5, 2000.0, 2500.5]
+    assert read["electrical_power_W"].tolist() == [985.5, 1234.5, 2000.0, 2500.5]
     file.write_text(text.format("5.910"))
     with pytest.raises(InputError, match="bench.csv: 4:2: got '5.910' among the decimal commas"):
         import_file(file)

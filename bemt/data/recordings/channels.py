@@ -44,6 +44,11 @@ _DRIVE_SPEEDS = {
 """Speeds that are the rotor's where there is no other, and on what condition."""
 AS_SHAFT = "power_W: taken as shaft power"
 """Start of the note on a power of which the heading does not say whose it is."""
+AS_ELECTRICAL = (
+    "power_W: taken as electrical, no torque is beside it; if a wattmeter read it, name the column electrical_power_W; "
+    "else shaft_power_W"
+)
+"""Note on one beside a thrust alone."""
 _NO_MOTOR = 0.95
 """Shaft power over electrical power that no motor with its controller reaches: declared. [1]"""
 
@@ -206,7 +211,10 @@ def named(d: Dataset) -> Dataset:
     # a heading that says power, and not whose
     plain = names.get("power_W") == "power_W" and d.headings.get("power_W", "power_W") != "power_W"
     bare = values.get("power_W") if plain else d.values.get("P_W")
-    _power(values, names, notes, bare, unit_alone(d.headings.get("P_W", "")) is not None)
+    # beside a thrust alone: no stand without a torque cell reads what a shaft takes
+    others = {"torque_Nm", "CP", "CQ", "voltage_V", "current_A"} & values.keys()
+    alone = plain and "thrust_N" in values and not others
+    _power(values, names, notes, bare, unit_alone(d.headings.get("P_W", "")) is not None, alone)
     if plain and "power_W" in values:
         notes.append(f"{AS_SHAFT}; if a wattmeter read it, name the column electrical_power_W")
     none = int(np.sum(~np.isfinite(values["run"]))) if "run" in values else 0
@@ -293,12 +301,15 @@ def electrical_power(values: Mapping[str, Array]) -> Array | None:
     return None if volts is None or amps is None else volts * amps
 
 
-def _power(values: dict[str, Array], names: dict[str, str], notes: list[str], bare: Array | None, shown: bool) -> None:
+def _power(
+    values: dict[str, Array], names: dict[str, str], notes: list[str], bare: Array | None, shown: bool, alone: bool
+) -> None:
     """Electrical power from its factors, and what a bare P stands for: without a torque, it is a wattmeter's.
 
-    ``shown``: whether it is headed as an instrument shows it, in watts and no more.
+    ``shown``: whether it is headed as an instrument shows it, in watts and no more; ``alone``: whether nothing but a
+    thrust is beside it.
     """
-    beside = shown or {"voltage_V", "current_A"} & values.keys()
+    beside = shown or alone or {"voltage_V", "current_A"} & values.keys()
     product = electrical_power(values)
     with np.errstate(all="ignore"):
         share = 1.0 if bare is None or product is None else float(np.nanmedian(np.abs(bare / product)))
@@ -306,7 +317,8 @@ def _power(values: dict[str, Array], names: dict[str, str], notes: list[str], ba
     if bare is not None and metered:
         names["electrical_power_W"] = names.pop("power_W", "P_W")
         values["electrical_power_W"] = values.pop("power_W", bare)
-        notes.append(f"{names['electrical_power_W']} is electrical_power_W: no torque is beside it")
+        own = f"{names['electrical_power_W']} is electrical_power_W: no torque is beside it"
+        notes.append(AS_ELECTRICAL if alone else own)
     elif bare is not None and "power_W" not in values:
         shaft = shaft_power(values)
         electric = electrical_power(values)

@@ -10,13 +10,12 @@ import numpy as np
 
 from bemt import __version__
 from bemt.base.tables import or_null, text_table
-from bemt.data.recordings.channels import AS_SHAFT
+from bemt.data.recordings.channels import AS_ELECTRICAL, AS_SHAFT
 from bemt.judge.compare.change_document import WORD, families, title_of
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import other_rotor
 from bemt.judge.diagnose.answer import bare
 from bemt.judge.diagnose.form import nearest
-from bemt.judge.diagnose.load import OPEN_POWER
 from bemt.judge.diagnose.posterior import LEAST
 from bemt.judge.diagnose.record import DROPPED, NO_SPEED
 from bemt.judge.diagnose.suggest import LEVEL
@@ -233,7 +232,7 @@ def explanation(d: Diagnosis) -> list[str]:
     decision, catalogue = d.said, effects.catalogue()
     lines = [headline(d), *(f"{words[:1].upper()}{words[1:]}." for words in d.problem.no_check)]
     off_torque = decision.verdict != "none" and abs(d.problem.level.get("torque_Nm", 0.0)) > LEVEL
-    marks = (NO_SPEED, OPEN_POWER, *([AS_SHAFT] if off_torque else []))
+    marks = (NO_SPEED, AS_ELECTRICAL, *([AS_SHAFT] if off_torque else []))
     lines += [f"Before any physics: {note}." for note in d.problem.notes if any(mark in note for mark in marks)]
     lines += [f"Before any physics: {f}" for f in d.problem.findings[:_FINDINGS]]
     if len(d.problem.findings) > _FINDINGS:

@@ -16,7 +16,7 @@ import numpy as np
 from bemt.base.errors import Fault, InputError, gathered, refuse
 from bemt.base.packed import part_of
 from bemt.base.units import ZERO_CELSIUS
-from bemt.data.recordings.channels import AS_SHAFT, file_name, named, stated
+from bemt.data.recordings.channels import file_name, named, stated
 from bemt.data.recordings.check import check, left_out
 from bemt.judge.compare.selection import one_rotor, speed_in_doubt, wind_of
 from bemt.judge.diagnose import record as records
@@ -100,7 +100,6 @@ def load(
     # in the log of a stand the sign is the hand of the rotor; in somebody's own table it may be a slip
     log = imported.format != "table"
     hand = log and any(f.id == "sign_flipped" and f.severity == "note" for f in findings)
-    whose: tuple[str, ...] = ()
     if {"CT", "CP", "CQ"} & set(imported.values):
         made = records.from_series(_points(imported, rows, path), case)
     else:
@@ -111,32 +110,16 @@ def load(
             points = _scattered(_points(imported, rows, path), points)
         elif _step_responses(imported, rows, points):
             points = replace(_points(imported, rows, path), notes=("short log: every row counts, transients too",))
-        points, whose = _without_open_power(points, rows)
         if hand:  # a rotor of the other hand: the sign of its torque is the sense of rotation
             points = replace(points, values={**points.values, "torque_Nm": -points.torque_Nm})
         made = records.from_series(points, case, correlated)
     turned = ("torque_Nm: negative under load (sense of rotation): sign reversed here",) if hand else ()
-    told = (n for n in rows.notes if not (whose and n.startswith(AS_SHAFT)))
-    notes = (*made.notes, *turned, *whose, *imported.notes, *told, *_unused(imported, rows, case))
+    notes = (*made.notes, *turned, *imported.notes, *rows.notes, *_unused(imported, rows, case))
     broken = tuple(f for f in findings if f.severity == "error" or (f.id == "sign_flipped" and f.severity == "warning"))
     units = imported.provenance.get("declared", {})
     declared = {k: units[name] for k in rows.values if (name := file_name(rows, k)) in units}
     return replace(made, findings=found, contradictions=broken, notes=notes, declared=declared,
                    computed=imported.kind == "cfd" or bool(setup), setup=setup, whole=imported)  # fmt: skip
-
-
-OPEN_POWER = "power_W: not used"
-"""Start of the note on a power that would pass for a torque, and of which nobody says whose it is."""
-
-
-def _without_open_power(points: Dataset, rows: Dataset) -> tuple[Dataset, tuple[str, ...]]:
-    """Points without a power beside a thrust that may be the shaft's or a wattmeter's, and what is said of it."""
-    asked = any(n.startswith(AS_SHAFT) for n in rows.notes)
-    if not asked or "torque_Nm" in rows.values or "thrust_N" not in rows.values:
-        return points, ()
-    kept = {k: v for k, v in points.values.items() if k not in ("power_W", "torque_Nm", "CP", "CQ", "eta")}
-    note = f"{OPEN_POWER}: if a wattmeter read it, name the column electrical_power_W; else shaft_power_W"
-    return replace(points, values=kept, u={k: v for k, v in points.u.items() if k in kept}, u_by={}), (note,)
 
 
 def _speed_missing(imported: Dataset, path: str) -> None:
