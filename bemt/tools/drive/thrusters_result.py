@@ -1,4 +1,18 @@
-"""Share force and roll moment among the thrusters of a body."""
+"""Share force and roll moment among the thrusters of a body.
+
+Axes: x forward, y to the left, z up, origin in the centre of mass. A thruster at (y, z), canted by gamma from the
+vertical to the left, gives
+
+    F_z = T cos(gamma),   M_x = T (y cos(gamma) - z sin(gamma)),   T_min <= T <= T_max.
+
+Within the limits the thrusts of least sum of squares are taken. Beyond them, what has priority is met first, as
+nearly as the limits allow, and then the other one.
+
+References
+----------
+T. A. Johansen, T. I. Fossen, "Control allocation - a survey", Automatica 49 (2013) 1087-1103,
+doi:10.1016/j.automatica.2013.01.035 (constrained allocation with priorities; not checked against the paper).
+"""
 
 from __future__ import annotations
 
@@ -16,33 +30,19 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.tables import csv_text, json_text, number_text, text_table, write_atomic
 from bemt.base.toml import Axis, Span, Table, axis_values, entry, read_model
+from bemt.base.units import G0, KGF
 from bemt.tools.drive import outputs
-
-# Thrusters on a body: which thrust each must give for a force and a roll moment, and what is beyond them.
-#
-# Axes: x forward, y to the left, z up, origin in the centre of mass. A thruster at (y, z), canted by gamma from the
-# vertical to the left, gives
-#
-#     F_z = T cos(gamma),   M_x = T (y cos(gamma) - z sin(gamma)),   T_min <= T <= T_max.
-#
-# Within the limits the thrusts of least sum of squares are taken. Beyond them, what has priority is met first, as
-# nearly as the limits allow, and then the other one.
-#
-# References
-# ----------
-# T. A. Johansen, T. I. Fossen, "Control allocation - a survey", Automatica 49 (2013) 1087-1103,
-# doi:10.1016/j.automatica.2013.01.035 (constrained allocation with priorities; not checked against the paper).
 
 
 @dataclass(frozen=True)
 class Thruster:
     """One thruster."""
 
-    y_m: float  # Position, to the left and up [m]
+    y_m: float  # Position, to the left [m]
     # Limits [N]
     thrust_max_N: float
     thrust_min_N: float = 0.0
-    z_m: float = 0.0  # Position, to the left and up [m]
+    z_m: float = 0.0  # Position, up [m]
     cant_rad: float = 0.0  # Tilt of the thrust from the vertical to the left [rad]
     name: str = ""  # Of the thruster
 
@@ -152,7 +152,6 @@ def moment_at(distance_m: ArrayLike, thrust_N: float, total_force_N: float | Non
     return np.asarray(distance_m, dtype=float) * (difference if difference >= 0.0 else math.nan)
 
 
-KGF = 9.80665
 RESULTS = ("thrusters.json", "mounting.csv", "thrusters.png")
 MOST = 1e6
 """Largest wanted force [N] and moment [N m]."""
@@ -277,7 +276,7 @@ def _text(body: BodyTable, thrusters: list[Thruster], got: Allocation, rows: lis
         f"given {number_text(got.force_N)} N and {number_text(got.moment_Nm)} N m"
     )
     if body.mass_kg is not None:
-        total, weight = sum(t.thrust_max_N * math.cos(t.cant_rad) for t in thrusters), body.mass_kg * KGF
+        total, weight = sum(t.thrust_max_N * math.cos(t.cant_rad) for t in thrusters), body.mass_kg * G0
         lines.append(f"total {total:.1f} N for a weight of {weight:.1f} N: {total / weight:.2f}")
     cells = [[number_text(v) for v in r.values()] for r in rows]
     lines.append(text_table(["distance [m]", "one thruster [N m]", "[kgf m]", "at the force [N m]"], cells, left=()))
