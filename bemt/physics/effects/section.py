@@ -26,6 +26,7 @@ class Section(Effect):
     drag: float = 1.2
 
     id = "section"
+    geometric = True
     title = "camber and drag level of the blade section"
     check = (
         "copy the section at 0.75 R from the blade (a cast, or a cut through a broken one) and compare it with the case"
