@@ -42,6 +42,7 @@ class LipSeparation(Effect):
 
     id = "lip_separation"
     torque_open = True
+    inviscid = True
     title = "flow separation at the duct lip"
     sign = (
         "thrust drops and torque rises above one loading and they recover below a lower one; Mach effects have no "
