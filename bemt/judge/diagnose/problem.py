@@ -77,6 +77,9 @@ class Part:
     instead: Array | None = None
     # Speed over pulse width as the reference shows it; None: as this recording itself does
     drive: SpeedCurve | None = None
+    # (C P,) What the rotor gives beyond the baseline, as a reference shows it: it goes with dynamic pressure, and cells
+    # read it, too; None: nothing
+    beyond: Array | None = None
     _solved: dict[tuple[Effect, ...], tuple[Array, Array, Flow]] = field(default_factory=dict, repr=False)
 
     @cached_property
@@ -107,10 +110,14 @@ class Part:
         values = {"thrust_N": T.copy(), "torque_Nm": Q.copy()}
         if "rpm" in self.record.measured:
             values["rpm"] = self.steady_rpm.copy()
+        beyond = np.zeros(len(self.channels) * T.size) if self.beyond is None else self.beyond
+        pressure = met.rho * met.rpm**2 / (self.flow.rho * self.flow.rpm**2)  # its coefficient stays
+        for c, more in zip(self.channels, np.split(beyond, len(self.channels)), strict=True):
+            values[c] = values[c] + (more if c == "rpm" else more * pressure)
         reading = Reading(values, self.full_scale)
         for e in effects:
             e.reading(reading, met)
-        return np.concatenate([reading.values[c] for c in self.channels])
+        return np.concatenate([reading.values[c] for c in self.channels]) - beyond
 
     def _respond(self, effects: Sequence[Effect]) -> tuple[Array, Array, Flow]:
         """Thrust [N] and torque [N m] with a set of effects, NaN where not converged, and the flow that is met."""
@@ -317,6 +324,17 @@ class Problem:
                 full.append(p.predict((*(e for e in p.baseline if e.id not in ids), *mine)))
             self.predicted[key] = np.concatenate(full)[self.kept]
         return self.predicted[key]
+
+    def beside(self, beyond: Array) -> Problem:
+        """The same, of rotors that give so much beyond the baseline, (M,): an instrument's error is of all it reads."""
+        full = np.zeros(self.kept.size)
+        full[self.kept] = beyond
+        ends = np.cumsum([len(p.channels) * len(p.record) for p in self.parts])
+        parts = (
+            replace(p, beyond=b if p.instead is None else None)
+            for p, b in zip(self.parts, np.split(full, ends[:-1]), strict=True)
+        )
+        return replace(self, parts=tuple(parts), predicted={})
 
     def directions(self, effect: Effect) -> Array:
         """What the signature of an effect is off by in each of the other laws, (M, D) [units of the readings]."""
