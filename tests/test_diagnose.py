@@ -46,13 +46,21 @@ def test_an_inviscid_law_errs_over_advance_ratio_only() -> None:
     given = points("air")
     built = assemble.build([record.from_series(recording(case(), given), case())], [case()])
     J = np.round(built.covariates["J"][built.point], 6)
-    for name, free in (("tip_loss", False), ("ground_effect", False), ("duct", False), ("reynolds", True)):
+    for name, free in (
+        ("tip_loss", False),
+        ("ground_effect", False),
+        ("duct", False),
+        ("lip_separation", False),
+        ("reynolds", True),
+    ):
         modes = noise.smooth_modes(built, (), noise.law_of(effects.catalogue()[name]))
         shown = modes @ modes.T  # the covariance, whatever the signs of its modes
         thrust = np.flatnonzero(built.channel == 0)
         spread = [np.ptp(shown[np.ix_(thrust[J[thrust] == x], thrust)], axis=0).max() for x in np.unique(J)]
         assert (max(spread) > 0.5) == free and (free or max(spread) < 1e-6), name
     assert noise.law_of(effects.catalogue()["thrust_gain"]) == ()
+    # both turn the zero-lift line: the law of the one is no better known than that of the other
+    assert noise.law_of(effects.catalogue()["section"]) == noise.law_of(effects.catalogue()["pitch_offset"]) == ()
 
 
 @pytest.mark.parametrize("slope", [0.0, 2e-4, -1e-3])
