@@ -143,8 +143,9 @@ def read_stations(path: Path, R: float) -> BladeStations:
         source.refuse("", odd, "one decimal mark")
     columns = _numbers(source, table, places, decimal)
     rows = _rootwards(source, table, places[0], columns[0])
-    x, chord, last = (values[rows] for values in columns)
-    beta = np.degrees(np.arctan2(last, 2.0 * np.pi * x)) if places[2].name == "pitch" else last
+    x, chord, beta = (values[rows] for values in columns)
+    if places[2].name == "pitch":
+        beta = np.degrees(np.arctan2(beta, 2.0 * np.pi * x))
     _limits(source, places, (x, chord, beta), R)
     source.check()
     _mistyped(source, table, rows, places, (x, chord, beta))

@@ -8,7 +8,6 @@ that the user states.
 from __future__ import annotations
 
 import os
-import shlex
 import traceback
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -22,8 +21,8 @@ from bemt.base.errors import Fault, InputError, system_fault
 from bemt.data import readers as importers
 from bemt.data.readers.cfd_run import KIND as RUN
 from bemt.data.readers.cfd_run import RunHead, RunToml
+from bemt.data.readers.left_open import one_step
 from bemt.data.readers.marks import EXPORT
-from bemt.data.readers.recording import kept_beside
 from bemt.data.readers.split import some
 from bemt.data.readers.uiuc import NO_SPEED
 from bemt.data.recordings import cfd_run
@@ -207,7 +206,7 @@ def _stated(
     if pole_pairs or ignore:
         options = options_of({"unit": unit, "column": column, "sign": sign, "ignore": ignore,
                               "pole-pairs": [pole_pairs] if pole_pairs else []})  # fmt: skip
-        about["step"] = f"bemt import {shlex.quote(file)} {' '.join(options)} --out {kept_beside([Path(file)])[0]}"
+        about["step"] = one_step(file, options)
     return replace(record, provenance=about)
 
 
