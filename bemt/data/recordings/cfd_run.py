@@ -165,13 +165,11 @@ def _opened(run: RunToml, folder: Path, name: str) -> tuple[OpenRun, list[tuple[
     files = [folder / f for f in run.run.files]
     walls = y_plus(files)
     read, faults = read_run([f for f in files if f.name != WALLS or not walls])
-    vectors = [(f, r) for f, r in read if any(n.startswith("force_") for n in r.values)]
-    homes = {zone_of(Path(f), r.format) for f, r in vectors}
+    homes = {zone_of(Path(f), r.format) for f, r in read if any(n.startswith("force_") for n in r.values)}
     columns = [c for file, record in read for c in columns_of(file, record, len(homes) > 1)]
     ignore, known = run.run.ignore or (), dict.fromkeys(n for c in columns for n in (c.name, c.stem))
-    if not faults:
-        faults = [Fault(name, "ignore", repr(n), f"one of {', '.join(known)}") for n in ignore if n not in known]
-    columns = [c for c in columns if c.name not in ignore and c.stem not in ignore]
+    faults = faults or [Fault(name, "ignore", repr(n), f"one of {', '.join(known)}") for n in ignore if n not in known]
+    columns = [c for c in columns if not {c.name, c.stem} & {*ignore}]
     told = {"restart": False, "joined": False, "left out": False, "rhoInf": bool(run.reference.density_kg_m3),
             "--sector": bool(run.run.sector)}  # fmt: skip
     notes = [n for _, r in read for n in r.notes if any(word in n and not said for word, said in told.items())]
@@ -352,8 +350,8 @@ def _table(record: Dataset) -> bool:
 
 
 def _unused(work: OpenRun, values: Mapping[str, Array]) -> None:
-    """Name columns that vary and became nothing: rows that differ in one of them only are no repeats."""
-    for quantity in ("thrust", "torque"):  # a column that no word but the user's made a load
+    """Name columns that became nothing, and those that no word but the user's made a load."""
+    for quantity in ("thrust", "torque"):
         told = work.fact(quantity).column
         if told is not None and quantity not in meanings(told):
             work.notes.append(f"{quantity} is {told}, as stated")
@@ -362,14 +360,16 @@ def _unused(work: OpenRun, values: Mapping[str, Array]) -> None:
     if left:
         work.notes.insert(0, f"not used: {', '.join(dict.fromkeys(left))}; --column says what it is")
     rest = [c for c in work.columns if _table(c.record) and c.name not in work.used and moves(c.record[c.name])]
-    rest = [c for c in rest if channel_of(c.stem) not in _KNOWN]
-    if not rest:
-        return
-    names = ", ".join(dict.fromkeys(c.name for c in rest))
-    state = {k: v for k, v in values.items() if k not in CHANNEL.values() and v.size == len(rest[0].record)}
+    if rest := [c for c in rest if channel_of(c.stem) not in _KNOWN]:
+        _unread_rows(work, values, ", ".join(dict.fromkeys(c.name for c in rest)), len(rest[0].record))
+
+
+def _unread_rows(work: OpenRun, values: Mapping[str, Array], names: str, rows: int) -> None:
+    """Name columns that vary and became nothing: rows that differ in one of them only are no repeats."""
+    state = {k: v for k, v in values.items() if k not in CHANNEL.values() and v.size == rows}
     stated = state and not _GRIDS & state.keys()
     apart = any(len(g) > 1 for g in groups(Dataset("cfd", "", state))) if stated else not state
-    end = f": {len(rest[0].record)} rows, of which some differ in nothing else, are no repeats" if apart else ""
+    end = f": {rows} rows, of which some differ in nothing else, are no repeats" if apart else ""
     work.unread = names if apart else ""
     work.notes.insert(0, f"not used, though the rows differ in it: {names}{end}; {WHICH}")
 
@@ -413,22 +413,22 @@ def _stated_grid(work: OpenRun) -> dict[str, float]:
 
 
 def _dataset(work: OpenRun, points: _Points, read: Sequence[tuple[str, Dataset]]) -> CfdRun:
+    """Points of a run as a dataset: rows without a load left out, those of several grids as one study."""
     name, values, averaged, drift = work.name, points.values, points.averaged, points.drift
     sizes = {k: v.size for k, v in values.items()}
     rows = max(sizes.values())
     if {*sizes.values()} - {1, rows}:
         got = ", ".join(f"{k} {size}" for k, size in sizes.items())
         raise InputError(Fault(name, "", f"columns of unlike length ({got})", "files of one run"))
-    full = {k: np.broadcast_to(v, (rows,)).copy() for k, v in values.items() if k not in _GRIDS}
-    each = values.get("cells", values.get("cell_size"))  # h^-3
+    whole = {k: np.broadcast_to(v, (rows,)).copy() for k, v in values.items()}
+    full = {k: v for k, v in whole.items() if k not in _GRIDS}
     conditions = _conditions(work, read, values.get("cells"), drift.get("thrust_N"))
     labels = next((tuple(r.texts["name"]) for _, r in read if len(r.texts.get("name", ())) == rows), ())
     sha256 = "+".join(r.sha256 for _, r in read)
     about: dict[str, Any] = {"file": name, "format": "cfd_run", "sha256": sha256}
     if rows == 1:
         about["means"] = {k: Mean(float(full[k][0]), over, drift.get(k)) for k, over in averaged.items()}
-    # A unit is asked for where the files state none
-    given = tuple(q for q in ("thrust", "torque") if (fact := getattr(work.run.columns, q)) and fact.unit)
+    given = tuple(q for q in ("thrust", "torque") if work.fact(q).unit)  # asked for where the files state none
     made = CfdRun("cfd", Path(name).name, full, {k: np.broadcast_to(v, (rows,)) for k, v in points.u.items()}, (),
                   about, labels, notes=tuple(dict.fromkeys(work.notes)), files=tuple(work.run.run.files),
                   conditions=conditions, averaged=averaged, drift=drift, units_given=given, zones=work.zones,
@@ -437,10 +437,10 @@ def _dataset(work: OpenRun, points: _Points, read: Sequence[tuple[str, Dataset]]
     if not keep.all():
         note = f"{number_of((~keep).sum(), 'point')} without a load left out"
         made = replace(made.select(keep), notes=(*made.notes, note))
-        each = None if each is None else np.broadcast_to(each, (rows,))[keep]
     made = replace(made, notes=(*_slips(made), *made.notes))
-    if each is not None and np.unique(each).size > 1:
-        return by_grid(made, each, None if "cells" in values else work.size_unit)
+    grids = next((whole[k][keep] for k in ("cells", "cell_size") if k in whole), np.zeros(0))  # or h^-3
+    if np.unique(grids).size > 1:
+        return by_grid(made, grids, None if "cells" in values else work.size_unit)
     u = _stated_grid(work)
     told = ", ".join(f"{k.split('_')[0]} {u[k]:.2%}" for k in ("thrust_N", "torque_Nm") if k in u)
     return with_grid_floor(made, u, (f"u of the grid: {told}, as stated",) if u else ())
