@@ -10,17 +10,17 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeGuard
+from typing import Any, NoReturn, TypeGuard
 
 import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.averaging import Mean
-from bemt.base.errors import Fault, InputError
-from bemt.base.tables import number_of, number_text, text_table
+from bemt.base.errors import Fault, InputError, gathered, refuse
+from bemt.base.tables import number_of
 from bemt.data import readers
 from bemt.data.readers.cfd import unit_of
-from bemt.data.readers.cfd_run import RunToml
+from bemt.data.readers.cfd_run import GridTable, RunToml
 from bemt.data.readers.headings import channel_of, heading, meanings
 from bemt.data.readers.marks import EXPORT
 from bemt.data.recordings.cfd_files import (
@@ -49,20 +49,14 @@ from bemt.data.recordings.cfd_loads import (
     other_axes,
     same_shaft,
 )
-from bemt.data.recordings.cfd_setup import (
-    THRUSTS,
-    TORQUES,
-    CfdRun,
-    Elsewhere,
-    conditions_text,
-    with_grid_floor,
-)
+from bemt.data.recordings.cfd_setup import THRUSTS, TORQUES, CfdRun, Elsewhere, with_grid_floor
 from bemt.data.recordings.channels import moves
 from bemt.data.recordings.check import check
-from bemt.data.recordings.grid_study import CELL_SIZE, COVERAGE, by_grid, groups, together
+from bemt.data.recordings.grid_study import COVERAGE
+from bemt.data.recordings.grids import CELL_SIZE, by_grid, groups, together
 from bemt.physics.dataset import Dataset
 
-__all__ = ["NO_LOAD", "assemble", "is_run", "run_at", "run_text"]
+__all__ = ["NO_LOAD", "assemble", "is_run", "run_at"]
 
 NO_LOAD = "a thrust or a torque"
 WHICH = "--column airspeed=NAME says what it is, --ignore NAME leaves it out"
@@ -132,7 +126,7 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> CfdRun:
     """Points of a run: rpm, thrust, torque, the duct's part, with u, and how each was averaged.
 
     One point, or one for each design point, from files relative to `folder`; runs of one condition on several grids
-    (``[[grids]]``, or rows of unlike cells) are one point, with `studies` (`grid_study.by_grid`). InputError with
+    (``[[grids]]``, or rows of unlike cells) are one point, with `studies` (`grids.by_grid`). InputError with
     everything that has to be said first: units, zones, speed.
     """
     if run.grids:
@@ -140,7 +134,6 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> CfdRun:
     work, read = _opened(run, folder, name)
     if not work.complete:
         _ask_all(work)
-        raise InputError(work.told)
     rpm = work.speed()
     work.period = 60.0 / float(rpm[0]) if rpm.size == 1 and np.isfinite(rpm[0]) else math.nan
     times = [c[1][-1] for _, r in read if r.clock == "time" and (c := clock_of(r))[1].size]
@@ -148,7 +141,6 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> CfdRun:
     if times and not math.isfinite(work.period):
         work.period = 1.0
         _ask_all(work)
-        raise InputError(work.told)
     loads = {name: load for q in ("thrust", "torque", "power") for name, load in _summed(work, q).items()}
     same_shaft(work)
     for column in work.named("duct_thrust")[:1] if run.columns.duct_thrust is not None else []:
@@ -223,28 +215,25 @@ def _beside(
 
 def _grids(run: RunToml, folder: Path, name: str) -> CfdRun:
     """Runs on several grids, the options the same for all of them, as one study."""
-    parts: list[CfdRun] = []
-    faults: list[Fault] = []
+    parts, faults = list[CfdRun](), list[Fault]()
     for grid in run.grids:
-        at = [folder / f for f in grid.files]
-        made = at[0] / "run.toml" if (at[0] / "run.toml").is_file() else at[0]
-        try:
-            part = run_of(made) if len(at) == 1 and made.is_file() else None
-            if part is None:
-                files = tuple(str(f) for path in at for f in (cfd_files(path) if path.is_dir() else (path,)))
-                own = run.run.model_copy(update={"files": files})
-                setup = run.setup.model_copy(update={"cells": None})
-                part = assemble(run.model_copy(update={"run": own, "grids": (), "setup": setup}), Path(), str(at[0]))
-        except InputError as error:
-            faults += error.faults
-            continue
-        if grid.cells is not None:
-            part = replace(part, conditions={**part.conditions, "cells": grid.cells})
-        parts.append(part)
-    if faults:
-        raise InputError(list(dict.fromkeys(faults)))
-    found = together(parts, name=name)
-    return replace(found, files=run.files)
+        with gathered(faults):
+            parts.append(_one_grid(run, folder, grid))
+    refuse(dict.fromkeys(faults))
+    return replace(together(parts, name=name), files=run.files)
+
+
+def _one_grid(run: RunToml, folder: Path, grid: GridTable) -> CfdRun:
+    """Run on one grid of several, with the cells that are stated."""
+    at = [folder / f for f in grid.files]
+    made = at[0] / "run.toml" if (at[0] / "run.toml").is_file() else at[0]
+    part = run_of(made) if len(at) == 1 and made.is_file() else None
+    if part is None:
+        files = tuple(str(f) for path in at for f in (cfd_files(path) if path.is_dir() else (path,)))
+        own = run.run.model_copy(update={"files": files})
+        setup = run.setup.model_copy(update={"cells": None})
+        part = assemble(run.model_copy(update={"run": own, "grids": (), "setup": setup}), Path(), str(at[0]))
+    return part if grid.cells is None else replace(part, conditions={**part.conditions, "cells": grid.cells})
 
 
 def _nothing(work: OpenRun) -> None:
@@ -262,14 +251,15 @@ def _nothing(work: OpenRun) -> None:
     work.fault(None, "", f"columns {known}", NO_LOAD, hint)
 
 
-def _ask_all(work: OpenRun) -> None:
-    """Say with a missing speed which units, zones and reference values are missing too."""
+def _ask_all(work: OpenRun) -> NoReturn:
+    """Refuse a run; a missing speed with the units, zones and reference values that are missing too."""
     pools = {quantity: pool for quantity in ("thrust", "torque", "power") if (pool := by_zone(work, quantity))}
     for quantity, pool in pools.items():
         counted_zones(work, quantity, pool)
         work.si(quantity, next(iter(pool.values())))
     if not pools:
         _nothing(work)
+    raise InputError(work.told)
 
 
 @dataclass(frozen=True, eq=False)
@@ -293,11 +283,8 @@ def _operating(work: OpenRun, rpm: Array) -> dict[str, Array]:
         values["cell_size"] = (sized[0].record[sized[0].name] * (1.0 if unit is None else unit.factor)) ** -3.0
         work.size_unit = "m" if unit is not None and unit.dimension == "length" else ""
         work.used.add(sized[0].name)
-    for name, quantity, given in (
-        ("airspeed_m_s", "airspeed", head.airspeed_m_s),
-        ("density_kg_m3", "density", head.density_kg_m3),
-    ):
-        own = work.named(quantity)
+    for name, quantity in (("airspeed_m_s", "airspeed"), ("density_kg_m3", "density")):
+        own, given = work.named(quantity), getattr(head, name)
         if given is not None:
             values[name] = np.array([given])
             rows = bool(own) and own[0].record.clock not in ("time", "iteration")
@@ -460,26 +447,3 @@ def of_rotor(run: CfdRun, diameter_m: float, density_kg_m3: float) -> CfdRun:
     guessed = set(_slips(run))
     said = _slips(run, diameter_m, density_kg_m3)
     return replace(run, notes=(*said, *(note for note in run.notes if note not in guessed)))
-
-
-_SHOWN = {"rpm": "rev/min", "airspeed_m_s": "V [m/s]", "J": "J", "thrust_N": "thrust [N]",
-          "duct_thrust_N": "of it duct [N]", "torque_Nm": "torque [N m]", "power_W": "power [W]",
-          "CT": "CT", "CQ": "CQ", "CP": "CP"}  # fmt: skip
-
-
-def _with_u(x: float, u: float) -> str:
-    return number_text(x, 5) + (f" ± {number_text(u, 2)}" if math.isfinite(u) else "")
-
-
-def run_text(d: CfdRun) -> str:
-    """A run for a terminal: points with u, what was averaged, what was decided."""
-    averaged, drifts = d.averaged, d.drift
-    names = [k for k in _SHOWN if k in d]
-    rows = [[_with_u(d[k][i], d.u[k][i]) for k in names] for i in range(len(d))]
-    lines = [f"one run: {', '.join(Path(f).name for f in d.files)}"]
-    lines.append(text_table([_SHOWN[k] for k in names], rows, (), "  "))
-    for over in dict.fromkeys(averaged.values()):
-        own = [k.rsplit("_", 1)[0] for k, v in averaged.items() if v == over]
-        drift = ", ".join(f"{k.rsplit('_', 1)[0]} {v:+.2%}" for k, v in drifts.items() if averaged.get(k) == over)
-        lines.append(f"  {', '.join(own)}: {over}" + (f"; drift {drift}" if drift else ""))
-    return "\n".join([*lines, f"  set-up: {conditions_text(d.conditions)}", *(f"  ! {note}" for note in d.notes)])

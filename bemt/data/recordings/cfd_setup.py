@@ -19,7 +19,7 @@ from bemt.physics.dataset import Dataset
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bemt.data.recordings.grid_study import LoadStudy
+    from bemt.data.recordings.grids import LoadStudy
 
 CONDITIONS = (
     "grid_level", "cells", "program", "solver", "gas", "turbulence", "domain", "domain_over_D", "sector", "steady",

@@ -35,7 +35,7 @@ from bemt.data.recordings.adapt import (
     reduction_of,
 )
 from bemt.data.recordings.cfd_files import PROGRAMS, cfd_files, other_than_loads
-from bemt.data.recordings.grid_study import merged, of_table
+from bemt.data.recordings.grids import merged, of_table
 from bemt.data.recordings.reduce import reduction
 from bemt.data.recordings.shown import INTERNAL, Imported, ImportedFile, options_of
 from bemt.physics.dataset import Dataset
@@ -134,17 +134,23 @@ def import_files(
             records[name] = stated[name] if name in stated else import_file(name, format, choice)
         except Exception as error:  # the other files are read all the same
             errors[name] = _refusal(error)
-    exports = {n: other_than_loads(r.values) for n, r in records.items() if r.kind == "cfd" and not cfd_run.is_run(r)}
-    if exports and all((*exports.values(), not runs)):
-        for name, what in exports.items():
-            errors[name] = str(Fault(name, "", f"{what}: {some(records.pop(name).values, 8)}", cfd_run.NO_LOAD, EXPORT))
-        to_do = None
+    if none := _without_loads(records, bool(runs)):
+        records = {name: record for name, record in records.items() if name not in none}
+        errors, to_do = errors | none, None
     told = {d.file for d in runs}
     runs = [*runs, *(d for d in records.values() if cfd_run.is_run(d) and d.file not in told)]
-    if rotor is not None:
-        runs = [cfd_run.of_rotor(d, *rotor) if cfd_run.is_run(d) else d for d in runs]
+    made = [d if rotor is None else cfd_run.of_rotor(d, *rotor) for d in runs if cfd_run.is_run(d)]
     files = [_file(name, format, records.get(name), errors.get(name), rotor or ()) for name in names]
-    return Imported(tuple(files), tuple(d for d in runs if cfd_run.is_run(d)), to_do)
+    return Imported(tuple(files), tuple(made), to_do)
+
+
+def _without_loads(records: Mapping[str, Dataset], run: bool) -> dict[str, str]:
+    """Refusals of the exports of a CFD program, by file, where none of them has a load and they make no run."""
+    alone = {n: r for n, r in records.items() if r.kind == "cfd" and not cfd_run.is_run(r)}
+    what = {n: other_than_loads(r.values) for n, r in alone.items()}
+    if run or not all(what.values()):
+        return {}
+    return {n: str(Fault(n, "", f"{what[n]}: {some(r.values, 8)}", cfd_run.NO_LOAD, EXPORT)) for n, r in alone.items()}
 
 
 def as_stated(files: Sequence[Any], run: Mapping[str, Any]) -> list[Any]:
@@ -154,7 +160,8 @@ def as_stated(files: Sequence[Any], run: Mapping[str, Any]) -> list[Any]:
     """
     if not any(v is not None and v != [] for v in run.values()):
         return list(files)
-    from bemt.data.recordings.cfd_options import run_from, stated_frame
+    from bemt.data.recordings.cfd_options import run_from
+    from bemt.data.recordings.stated import stated_frame
 
     if not run.get("zones") and all(hasattr(f, "columns") or is_measured(f) for f in files):
         told: list[list[str]] = [run.get(name) or [] for name in ("unit", "column", "sign", "ignore")]
@@ -194,7 +201,7 @@ def _stated(
     Pole pairs and headings to ignore are stated to ``import`` alone: its next step is the file that keeps them.
     """
     from bemt.data.readers.recording_toml import RecordingToml, joined
-    from bemt.data.recordings.cfd_options import filled, recording_from
+    from bemt.data.recordings.stated import filled, recording_from
 
     if unit or column or sign or pole_pairs or ignore:
         made = RecordingToml.model_validate(recording_from(file, unit, column, sign, pole_pairs, ignore=ignore))
@@ -225,12 +232,13 @@ def _runs_and_exports(names: Sequence[str], insist: bool) -> tuple[list[Dataset]
     """Which names are a run by themselves, as a run.toml is, and which are exports of CFD programs."""
     runs, exports = [], list[str]()
     for name in names:
+        at = Path(name)
         try:
-            if Path(name).is_dir() and not (Path(name) / "run.toml").is_file():
-                exports += map(str, cfd_files(Path(name)))
-            elif Path(name).is_dir() or importers.detect(name) == RUN:
+            if at.is_dir() and not (at / "run.toml").is_file():
+                exports += map(str, cfd_files(at))
+            elif (kind := RUN if at.is_dir() else importers.detect(name)) == RUN:
                 runs.append(import_file(name))
-            elif importers.detect(name) in PROGRAMS:
+            elif kind in PROGRAMS:
                 exports.append(name)
         except (InputError, OSError):
             if insist:

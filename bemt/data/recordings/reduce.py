@@ -40,14 +40,13 @@ from bemt.data.recordings.points import (
     TARED,
     Found,
     Point,
-    TareZero,
     command_of,
-    from_rest,
     from_rows,
     from_samples,
     is_samples,
 )
 from bemt.data.recordings.scatter import Hysteresis, hysteresis, repeats, session
+from bemt.data.recordings.zero import TareZero, from_rest
 from bemt.physics import coefficients as co
 from bemt.physics.air import AIR_C, GAMMA, R_DRY, Air
 from bemt.physics.dataset import Dataset

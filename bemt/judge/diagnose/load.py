@@ -65,11 +65,11 @@ def load(
     airspeed_m_s: float | None = None, density_kg_m3: float | None = None,
 ) -> Record:  # fmt: skip
     """Read one recording, whatever its format."""
-    from bemt.data.recordings.cfd_options import filled
     from bemt.data.recordings.cfd_run import is_run, of_rotor, run_at
     from bemt.data.recordings.cfd_setup import one_grid, stated_setup
     from bemt.data.recordings.load import import_file
     from bemt.data.recordings.reduce import reduce, reduction
+    from bemt.data.recordings.stated import filled
 
     if imported is None:
         imported = run_at(path, rpm, airspeed_m_s)
@@ -257,7 +257,7 @@ _File = tuple[Any, "Case", dict[str, float | None]]
 def _on_grids(files: Sequence[_File]) -> list[tuple[Any, Case, dict[str, float | None], Dataset | None]]:
     """Files with what was read of each; CFD runs of one condition on several grids are one study, no repeats."""
     from bemt.data.recordings.cfd_run import is_run, run_at
-    from bemt.data.recordings.grid_study import are_grids, together
+    from bemt.data.recordings.grids import are_grids, together
     from bemt.data.recordings.load import import_file
 
     read: dict[int, Dataset] = {}
