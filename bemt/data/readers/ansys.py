@@ -233,8 +233,11 @@ def read_design_points(path: str | os.PathLike[str]) -> Dataset:
             rows.append(ExportRow(line, tuple(cell or "nan" for cell in cells)))
     if not names:
         source.refuse("", "no header", "a line such as Name,P1,P2")
-    heads = ((n, told.get(n) or _headed(n)) for n in names)
-    columns = [Column(words, si_unit(own) or own) for n, (words, unit) in heads for own in (unit or units.get(n, ""),)]
+    columns = []
+    for name in names:
+        words, unit = told.get(name) or _headed(name)
+        unit = unit or units.get(name, "")
+        columns.append(Column(words, si_unit(unit) or unit))
     table = numeric_table(source, columns, rows, mark != ",")
     texts = {"name": tuple(labels)} if len(labels) == len(table.values) else {}
     about = {**source.about, "clock": "none"}

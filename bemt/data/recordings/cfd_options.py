@@ -166,23 +166,30 @@ def _grids(files: Sequence[str], told: Told, faults: list[Fault]) -> list[Mappin
     """
     cells = told.get("cells")
     if isinstance(cells, str) and "," in cells:
-        each, own = [number(part) for part in cells.split(",")], [_home(f) for f in files]
-        at = [own[:k].count(home) for k, home in enumerate(own)]  # of files of one kind
-        if len(each) != len(files) and {own.count(home) for home in own} == {len(each)}:
-            each = [each[k] for k in at]
-        if len(each) == len(files) and None not in each:
-            grids = {n: [k for k, m in enumerate(each) if m == n] for n in each}
-            if any(len({own[k] for k in of}) < len(of) for of in grids.values()):  # of several conditions
-                return [{"files": (f,), "cells": n} for f, n in zip(files, each, strict=True)]
-            return [{"files": tuple(files[k] for k in of), "cells": n} for n, of in grids.items()]
-        got, wanted = f"cells={cells} for {len(files)} files", "one number for each file, in their order"
-        hint = f"Or {len(each)} files of each kind; a folder counts as one"
-        faults.append(Fault("", "--setup", got, wanted, hint))
-        told["cells"] = None
-        return []
+        each, kinds = [number(part) for part in cells.split(",")], [_home(f) for f in files]
+        if (found := _listed(files, each, kinds)) is None:
+            got, wanted = f"cells={cells} for {len(files)} files", "one number for each file, in their order"
+            hint = f"Or {len(each)} files of each kind; a folder counts as one"
+            faults.append(Fault("", "--setup", got, wanted, hint))
+            told["cells"] = None
+        return found or []
     made = [(Path(f) / "run.toml").as_posix() if (Path(f) / "run.toml").is_file() else f for f in files]
     told.setdefault("cells", None)
     return [{"files": (f,)} for f in made] if len(made) > 1 and all(map(_is_grid, made)) else []
+
+
+def _listed(
+    files: Sequence[str], each: Sequence[float | None], kinds: Sequence[object]
+) -> list[Mapping[str, object]] | None:
+    """Files of each grid by the cells that are listed; None where the list does not go with the files."""
+    if len(each) != len(files) and {kinds.count(kind) for kind in kinds} == {len(each)}:
+        each = [each[kinds[:k].count(kind)] for k, kind in enumerate(kinds)]  # of files of one kind
+    if len(each) != len(files) or None in each:
+        return None
+    grids = {n: [k for k, m in enumerate(each) if m == n] for n in each}
+    if any(len({kinds[k] for k in of}) < len(of) for of in grids.values()):  # of several conditions
+        return [{"files": (f,), "cells": n} for f, n in zip(files, each, strict=True)]
+    return [{"files": tuple(files[k] for k in of), "cells": n} for n, of in grids.items()]
 
 
 def _home(file: str) -> object:

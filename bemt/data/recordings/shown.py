@@ -89,15 +89,7 @@ def points_text(reduced: Dataset | str) -> list[str]:
     if isinstance(reduced, str):
         return [f"  not reduced: {reduced}"]
     how, n = reduction(reduced), len(reduced)
-    values, stated_u = ({k: v for k, v in d.items() if np.isfinite(v).any()} for d in (reduced.values, reduced.u))
-    if "throttle" in values:  # one command
-        values.pop("pwm_s", None)
-    columns = {"from": [label.rsplit(":", 1)[-1] for label in reduced.labels or ("",) * n]}
-    for name in (k for k in SHOWN if k in values):
-        columns[name] = [_cell(name, x, 5) for x in values[name][:MOST]]
-        if name in stated_u:
-            columns[f"u({name})"] = [_cell("", x, 2) for x in stated_u[name][:MOST]]
-    columns["flags"] = [", ".join(flags) or "-" for flags in reduced.flags]
+    columns = _columns_of_points(reduced)
     many = "" if n <= MOST else f", the first {MOST} of them"
     what = "one per row" if how.mode == "points" else "means of plateaus"
     rows = list(zip(*(column[:MOST] for column in columns.values()), strict=True))
@@ -108,6 +100,19 @@ def points_text(reduced: Dataset | str) -> list[str]:
         tables.text_table(list(columns), rows, (len(columns) - 1,), "    "),
         *_dropped(how), *(f"  shared by all points, {text}" for text in shared), *(f"  . {t}" for t in reduced.notes),
     ]  # fmt: skip
+
+
+def _columns_of_points(points: Dataset) -> dict[str, list[str]]:
+    """Cells of a table of points by heading: lines of the file, channels with their u, flags."""
+    values, stated_u = ({k: v for k, v in d.items() if np.isfinite(v).any()} for d in (points.values, points.u))
+    if "throttle" in values:  # one command
+        values.pop("pwm_s", None)
+    columns = {"from": [label.rsplit(":", 1)[-1] for label in points.labels or ("",) * len(points)]}
+    for name in (k for k in SHOWN if k in values):
+        columns[name] = [_cell(name, x, 5) for x in values[name][:MOST]]
+        if name in stated_u:
+            columns[f"u({name})"] = [_cell("", x, 2) for x in stated_u[name][:MOST]]
+    return columns | {"flags": [", ".join(flags) or "-" for flags in points.flags]}
 
 
 def _curve(record: Dataset) -> list[str]:
@@ -299,9 +304,10 @@ class Imported:
                   if g.id == "sign_flipped" and g.severity == "warning"} for f in self.files]  # fmt: skip
         if turned := sorted(set[str]().union(*flips).intersection(*flips)):
             said = {**said, "sign": [*said.get("sign", ()), *(f"{quantity}=-1" for quantity in turned)]}
-        read = [(f.path, f.record.kind, set(named(f.record).values)) for f in self.files if f.record]
-        loaded = [shlex.quote(p) for p, _, known in read if _LOADS & known and "rpm" in {*known, *said}]
-        alone = [shlex.quote(p) for p, kind, known in read if kind == "bench" and _LOADS & known]
+        read = [(shlex.quote(f.path), f.record.kind, set(named(f.record).values)) for f in self.files if f.record]
+        read = [(path, kind, known) for path, kind, known in read if _LOADS & known]
+        loaded = [path for path, _, known in read if "rpm" in {*known, *said}]
+        alone = [path for path, kind, _ in read if kind == "bench"]
         how = options_of({k: v for k, v in said.items() if k in ("unit", "column", "sign")})
         if alone and not loaded:
             pair = " ".join(["bemt compare", *(alone if len(alone) == 2 else [alone[0], "ANOTHER_RUN"]), *how])

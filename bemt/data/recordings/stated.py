@@ -160,8 +160,7 @@ def recording_from(
     ignore: Sequence[str] = (), rpm: float | None = None, airspeed_m_s: float | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """Tables of a recording.toml from what options say of a table of measurements; their faults come after `faults`."""
-    faults = list(faults)
-    table = split_table(load_text(file))
+    faults, table = list(faults), split_table(load_text(file))
     faults += [Fault("", "--ignore", repr(h), f"one of {some(map(repr, table.headings), 12)}")
                for h in ignore if h not in table.headings]  # fmt: skip
     read_as = {q: h for q, h in _read_as(file).items() if h not in ignore}
@@ -169,14 +168,7 @@ def recording_from(
     loads = [q for q in ("thrust", "torque") if q in headings.read_as]
     if loads and list(sign) in (["-1"], ["1"]):  # turns all
         sign = [f"{q}={text}" for q in loads for text in sign]
-    columns = _facts(headings, unit, column, sign, faults)
-    if not (columns or faults):
-        columns = headings.plain()
-    if pole_pairs:
-        columns |= {} if "electrical_rpm" in columns else headings.electrical(columns.pop("rpm", {}))
-    for quantity, facts in columns.items():
-        faults += headings.complete(quantity, facts)
-    refuse(faults)
+    columns = _facts(headings, unit, column, sign, pole_pairs, faults, plain=True)
     head: dict[str, Any] = {"file": Path(file).name} | ({"decimal": ","} if decimal_mark(table) == "," else {})
     head |= {"ignore": list(ignore)} if ignore else {}
     head |= {k: v for k, v in (("rpm", rpm), ("airspeed_m_s", airspeed_m_s)) if v is not None}
@@ -205,14 +197,7 @@ def stated_frame(
     >>> stated_frame(pd.DataFrame({"eRPM": [42000.0]}), pole_pairs=7).to_dict("list")
     {'rpm': [6000.0]}
     """
-    faults: list[Fault] = []
-    headings = _Measured([str(h) for h in frame.columns])
-    columns = _facts(headings, unit, column, sign, faults)
-    if pole_pairs:
-        columns |= {} if "electrical_rpm" in columns else headings.electrical(columns.pop("rpm", {}))
-    for quantity, facts in columns.items():
-        faults += headings.complete(quantity, facts)
-    refuse(faults)
+    columns = _facts(_Measured([str(h) for h in frame.columns]), unit, column, sign, pole_pairs, [])
     out = frame.rename(columns=str)
     for quantity, facts in columns.items():
         own, told = facts["column"], units.UNITS[str(facts["unit"])]
@@ -227,13 +212,21 @@ def stated_frame(
 
 
 def _facts(
-    headings: _Measured, unit: Iterable[str], column: Iterable[str], sign: Sequence[str], faults: list[Fault]
-) -> dict[str, Facts]:
-    """What options say of the columns of a table."""
+    headings: _Measured, unit: Iterable[str], column: Iterable[str], sign: Sequence[str], pole_pairs: int | None,
+    faults: list[Fault], plain: bool = False,
+) -> dict[str, Facts]:  # fmt: skip
+    """Column, unit and sign of each quantity that options name, or with `plain` the headings where none does."""
     columns: dict[str, Facts] = {}
     gather("--column", column, headings.column, columns, faults)
     gather("--unit", unit, headings.unit, columns, faults)
     gather("--sign", sign, headings.sign, columns, faults)
+    if plain and not (columns or faults):
+        columns = headings.plain()
+    if pole_pairs:
+        columns |= {} if "electrical_rpm" in columns else headings.electrical(columns.pop("rpm", {}))
+    for quantity, facts in columns.items():
+        faults += headings.complete(quantity, facts)
+    refuse(faults)
     return columns
 
 
