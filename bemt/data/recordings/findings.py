@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
+from bemt.data.readers.split import some
 from bemt.data.recordings.channels import asks, named, names_of
 from bemt.physics.air import LIQUID
 from bemt.physics.dataset import Dataset
@@ -197,9 +198,7 @@ def facts_of(
 
 def where_of(facts: Facts, rows: Array | NDArray[np.intp]) -> str:
     """Lines of the first of some rows."""
-    lines = [str(facts.lines[int(r)]) for r in rows[:6]]
-    more = f" and {len(rows) - 6} more" if len(rows) > 6 else ""
-    return f"line{'s' if len(rows) > 1 else ''} {', '.join(lines)}{more}"
+    return f"line{'s' if len(rows) > 1 else ''} {some((facts.lines[int(r)] for r in rows), 6)}"
 
 
 # Rows from which a recording is a log, and share of those under load that are misread in one.

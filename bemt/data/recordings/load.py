@@ -97,10 +97,9 @@ def _unsettled(record: Dataset) -> list[str]:
     if record.clock not in ("time", "iteration"):
         return []
     means: Mapping[str, Mean] = record.means
-    top: dict[str, float] = {}
+    top: dict[str, float] = {"": 0.0}
     for name, mean in means.items():
-        unit = record.unit(name)
-        if unit:
+        if unit := record.unit(name):
             top[unit] = max(top.get(unit, 0.0), abs(mean.value))
     moving = [
         f"{name} {mean.drift:+.2%}"
@@ -108,10 +107,9 @@ def _unsettled(record: Dataset) -> list[str]:
         if mean.drift is not None
         and abs(mean.drift) > SETTLED
         and not name.lower().startswith(("rms[", "res_"))
-        and abs(mean.value) >= 0.05 * top.get(record.unit(name), 0.0)
+        and abs(mean.value) >= 0.05 * top[record.unit(name)]
     ]
-    more = f" and {len(moving) - 6} more" if len(moving) > 6 else ""
-    return [f"not settled (drift over the averaged part): {', '.join(moving[:6])}{more}"] if moving else []
+    return [f"not settled (drift over the averaged part): {some(moving, 6)}"] if moving else []
 
 
 def import_files(

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from bemt.base import unit_errors
 from bemt.base.arrays import Array
 from bemt.data.readers.samples import MOST_RPM_PER_V
+from bemt.data.readers.split import some
 from bemt.data.recordings.findings import MOTOR_EFFICIENCY, Facts, Finding, check_for
 from bemt.physics import k1k2 as empirical
 
@@ -430,7 +431,7 @@ def _likely(quantity: str, log_factor: float) -> list[Slip]:
 
 
 def _evidence(odd: _Odd) -> str:
-    names = ", ".join(w.name for w in odd.rest[:3]) + (f" and {len(odd.rest) - 3} more" if len(odd.rest) > 3 else "")
+    names = some((w.name for w in odd.rest), 3)
     agree = f", which agree within {math.expm1(max(odd.spread, 0.01)):.0%}" if len(odd.rest) > 1 else ""
     return f"readings over what the case gives are {math.exp(odd.by):.4g} times those of {names}{agree}"
 
