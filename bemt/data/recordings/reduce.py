@@ -268,7 +268,6 @@ def _series(
     air: AirOfPoints, diameter: float | None,
 ) -> Dataset:  # fmt: skip
     """Channels and derived ones, as a `Dataset`."""
-    n = len(found.points)
     shown = {k: v for k, v in values.items() if k not in ("humidity", "electrical_rpm", "optical_rpm")}
     if len({p.run for p in found.points}) > 1 or "run" in rec.values:
         shown["run"] = np.array([p.run for p in found.points])
@@ -277,16 +276,14 @@ def _series(
     said = recording.provenance
     file = str(said.get("file", recording.name))
     short = file.replace("\\", "/").rsplit("/", 1)[-1]
-    labels = []
-    for p in found.points:
-        first, last = rec.lines[p.rows[0]], rec.lines[p.rows[-1]]
-        labels.append(f"{short}:{first}" + (f"-{last}" if len(p.rows) > 1 else ""))
+    ends = [[rec.lines[row] for row in dict.fromkeys((p.rows[0], p.rows[-1]))] for p in found.points]
+    labels = [f"{short}:{'-'.join(map(str, lines))}" for lines in ends]
     provenance = {k: v for k, v in said.items() if isinstance(v, str)}
     series = Dataset("bench", str(said.get("run_name", short)), shown, {k: v for k, v in u.items() if k in shown},
                     tuple(p.flags for p in found.points), provenance, tuple(labels))  # fmt: skip
     if diameter is None:
         if {"torque_Nm", "rpm"} <= shown.keys() and "power_W" not in shown:
-            series = series.derive(1.0, np.full(n, np.nan))
+            series = series.derive(1.0, np.full(len(series), np.nan))
             keep = [k for k in series.values if k in shown or k == "power_W"]
             series = replace(series, values={k: series[k] for k in keep}, u={k: series.u[k] for k in keep})
         return series
