@@ -27,6 +27,7 @@ from bemt.data.readers.split import (
     SplitTable,
     column_numbers,
     decimal_mark,
+    few,
     find_start,
     heading_cells,
     is_comment,
@@ -139,8 +140,7 @@ def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
         build.warnings.append(f"{own!r} counts electrical revolutions: the speed of the rotor is that over pole pairs")
         build.asks.append("--pole-pairs PAIRS")
     for name, kinds in setups(build.texts).items():
-        shown = ", ".join(kinds[:4]) + (", ..." if len(kinds) > 4 else "")
-        build.warnings.append(f"{len(kinds)} set-ups in one file, distinguished by {name!r}: {shown}")
+        build.warnings.append(f"{len(kinds)} set-ups in one file, distinguished by {name!r}: {few(kinds)}")
     build.check_magnitudes()
     loads = {"thrust_N", "torque_Nm"} & build.channels.keys()
     if loads and (speeds or {"time_s", "pulse_width_s", "throttle"} & build.channels.keys()):

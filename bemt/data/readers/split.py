@@ -170,6 +170,11 @@ def some(items: Iterable[object], limit: int = 5) -> str:
     return ", ".join(map(str, found[:limit])) + more
 
 
+def few(items: Sequence[str], limit: int = 4) -> str:
+    """First few of many, and dots for the others."""
+    return ", ".join(items[:limit]) + (", ..." if len(items) > limit else "")
+
+
 def find_delimiter(lines: Sequence[str]) -> str:
     """Delimiter of some lines: the first of ``; tab , |`` that all of them have, else blanks.
 

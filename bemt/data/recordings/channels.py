@@ -21,6 +21,7 @@ from bemt.base.arrays import Array
 from bemt.base.tables import number_of
 from bemt.data.readers.headings import USUAL, counts_electrical, may_be_shaft_speed, meanings, unit_alone
 from bemt.data.readers.recording import FULL_THROTTLE
+from bemt.data.readers.split import few
 from bemt.physics.dataset import Dataset
 
 HUGE = 1e9
@@ -221,7 +222,7 @@ class _Named:
                 continue
             far = np.abs(v) > (HUGE if target != "time_s" else LATEST_S)
             if far.any():
-                shown = ", ".join(f"{x:.3g}" for x in v[far][:3]) + (", ..." if far.sum() > 3 else "")
+                shown = few([f"{x:.3g}" for x in v[far][:4]], 3)
                 self.lost += lost(d, np.flatnonzero(far), target, f"{shown}: no physical magnitude")
             values[target], self.names[target] = np.where(far, np.nan, v) if far.any() else v, name
 

@@ -125,13 +125,11 @@ def misread(facts: Facts) -> Iterator[Finding]:
         return
     flow = None
     if not facts.still.all():
-        with np.errstate(all="ignore"):
-            flow = facts.J if V is None else V / rpm * 1e3  # of the order of one
+        flow = facts.J if V is None else V / rpm * 1e3  # of the order of one
     if any(_varies(facts.values[k]) for k in states if k in facts.values):
         return
-    for name in ("thrust_N", "torque_Nm"):
-        v = facts.get(name)
-        if v is None or not np.any(np.nan_to_num(v)):
+    for name, v in facts.known("thrust_N", "torque_Nm"):
+        if not np.any(np.nan_to_num(v)):
             continue
         size = np.abs(np.nan_to_num(v))
         good = (np.nan_to_num(rpm) > 0.0) & ~stuck(name, facts.values)
@@ -153,7 +151,7 @@ def misread(facts: Facts) -> Iterator[Finding]:
 @check_for("stuck")
 def sticks(facts: Facts) -> Iterator[Finding]:
     """A sensor that repeats one reading in part of a table of points."""
-    for name in (k for k in STICKS if facts.get(k) is not None):
+    for name, _ in facts.known(*STICKS):
         rows = np.flatnonzero(stuck(name, facts.values))
         if rows.size:
             whole = np.append(rows[0] - 1, rows)
@@ -180,13 +178,9 @@ def units_within(facts: Facts) -> Iterator[Finding]:
     if rpm is None or facts.bare:
         return
     electric = facts.filled.get("electrical_power_W")
-    for name in ("thrust_N", "torque_Nm"):
-        v = facts.get(name)
-        if v is None:
-            continue
-        with np.errstate(all="ignore"):
-            level = np.log(np.abs(v) / rpm**2)
-            powers = level * np.nan if electric is None else np.log(np.abs(electric) / rpm**3)
+    for name, v in facts.known("thrust_N", "torque_Nm"):
+        level = np.log(np.abs(v) / rpm**2)
+        powers = level * np.nan if electric is None else np.log(np.abs(electric) / rpm**3)
         rows = np.flatnonzero(np.isfinite(level))
         if rows.size < 2 * _FEW or not facts.still[rows].all():
             continue
@@ -197,8 +191,7 @@ def units_within(facts: Facts) -> Iterator[Finding]:
         if abs(jump) <= np.log(_JUMP) or any(np.ptp(part) >= np.log(_STEADY) for part in parts):
             continue
         line = facts.lines[int(rows[k])]
-        with np.errstate(all="ignore"):
-            power = float(np.median(powers[rows[k:]]) - np.median(powers[rows[:k]]))
+        power = float(np.median(powers[rows[k:]]) - np.median(powers[rows[:k]]))
         if power * np.sign(jump) > np.log(_STEADY):
             few = rows[:k] if 2 * k < rows.size else rows[k:]
             lines = f"lines {facts.lines[int(few[0])]} to {facts.lines[int(few[-1])]}"
@@ -244,10 +237,10 @@ def slow_rotor(facts: Facts) -> Iterator[Finding]:
     Rows far apart alone say nothing, since points written down by hand are. But one that took the new speed is there
     by the next row; none needs more than `SLOWEST_S`, whatever its size.
     """
-    t, told, command = facts.time_s, facts.first("rpm", "thrust_N"), facts.first("pwm_s", "throttle")
-    if t is None or command is None or told is None:
+    t, told, command = facts.time_s, [*facts.known("rpm", "thrust_N")], [*facts.known("pwm_s", "throttle")]
+    if t is None or not command or not told:
         return
-    response, (_, c), y = told[0], command, told[1]
+    (response, y), (_, c) = told[0], command[0]
     rows = np.flatnonzero(np.isfinite(t) & np.isfinite(c) & np.isfinite(y))
     t, c, y = t[rows], c[rows], np.abs(y[rows])
     if rows.size < 2 * HELD or float(np.ptp(c)) == 0.0 or float(np.ptp(y)) == 0.0:

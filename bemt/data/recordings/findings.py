@@ -81,9 +81,9 @@ class Facts:
         v = self.values.get(name)
         return v if v is not None and bool(np.any(np.isfinite(v))) else None
 
-    def first(self, *names: str) -> tuple[str, Array] | None:
-        """First channel of these with a finite value."""
-        return next(((name, v) for name in names if (v := self.get(name)) is not None), None)
+    def known(self, *names: str) -> Iterator[tuple[str, Array]]:
+        """Channels of these with a finite value."""
+        return ((name, v) for name in names if (v := self.get(name)) is not None)
 
     def named(self, name: str) -> str:
         """Name in the file."""

@@ -28,9 +28,8 @@ from bemt.physics import coefficients as co
 @check_for("signs")
 def flipped(facts: Facts) -> Iterator[Finding]:
     """A whole channel, or some of its rows, with the other sign."""
-    for name in ("thrust_N", "torque_Nm", "power_W", "voltage_V", "current_A", "rpm"):
-        v = facts.get(name)
-        if v is None or (facts.bare and name in ("thrust_N", "torque_Nm", "power_W")):
+    for name, v in facts.known("thrust_N", "torque_Nm", "power_W", "voltage_V", "current_A", "rpm"):
+        if facts.bare and name in ("thrust_N", "torque_Nm", "power_W"):
             continue
         size = np.abs(np.nan_to_num(v))
         top = float(np.percentile(size, 95))
@@ -68,13 +67,11 @@ def _mirrored(facts: Facts, name: str, v: Array, loaded: NDArray[np.bool_], sign
     rpm = facts.rpm
     scaled = np.abs(v)
     if rpm is not None and name in ("thrust_N", "torque_Nm", "power_W"):
-        with np.errstate(all="ignore"):
-            scaled = scaled / np.abs(rpm) ** (3.0 if name == "power_W" else 2.0)
+        scaled = scaled / np.abs(rpm) ** (3.0 if name == "power_W" else 2.0)
     usual = scaled[loaded & (v * sign > 0.0) & np.isfinite(scaled)]
     if usual.size < 3:
         return np.zeros(len(v), dtype=bool)
-    with np.errstate(all="ignore"):
-        alike = np.abs(np.log(scaled / np.median(usual))) < math.log(2.0)
+    alike = np.abs(np.log(scaled / np.median(usual))) < math.log(2.0)
     return np.asarray(loaded & (v * sign < 0.0) & alike)
 
 
@@ -115,8 +112,7 @@ def power_above_input(facts: Facts) -> Iterator[Finding]:
         shaft, words = facts.power_W, facts.named("power_W")
     if shaft is None:
         return
-    with np.errstate(all="ignore"):
-        ratio = np.abs(shaft) / electric
+    ratio = np.abs(shaft) / electric
     odd = facts.loaded & (ratio > 1.02) & np.isfinite(ratio)
     if enough(odd, facts.loaded):
         rows = np.flatnonzero(odd)
@@ -144,12 +140,10 @@ def power_lost(facts: Facts) -> Iterator[Finding]:
         T, rpm, D = facts.filled.get("thrust_N"), facts.rpm, facts.diameter_m
         if T is None or (D is None and rpm is None) or facts.ducted:
             return
-        with np.errstate(all="ignore"):
-            disk = D if D is not None else (np.abs(T) / (0.1 * facts.rho * (np.asarray(rpm) / 60.0) ** 2)) ** 0.25
-            shaft = np.abs(T) ** 1.5 / np.sqrt(0.5 * math.pi * facts.rho) / disk / USUAL_MERIT
+        disk = D if D is not None else (np.abs(T) / (0.1 * facts.rho * (np.asarray(rpm) / 60.0) ** 2)) ** 0.25
+        shaft = np.abs(T) ** 1.5 / np.sqrt(0.5 * math.pi * facts.rho) / disk / USUAL_MERIT
         rows, words = facts.loaded & facts.still & (T > 0.0), "by its thrust the shaft takes about"
-    with np.errstate(all="ignore"):
-        ratio = (np.abs(shaft) / electric)[rows]
+    ratio = (np.abs(shaft) / electric)[rows]
     ratio = ratio[np.isfinite(ratio)]
     if ratio.size < 3 or not 0.0 < float(np.median(ratio)) < LEAST_EFFICIENCY:
         return
@@ -175,21 +169,20 @@ def merit_above_one(facts: Facts) -> Iterator[Finding]:
     shaft = shaft_power(facts.filled)
     if shaft is None:
         shaft = facts.power_W
-    with np.errstate(all="ignore"):
-        if T is not None and D is not None and D > 0.0 and shaft is not None:
-            P = np.abs(shaft)
-            area = math.pi / 4.0 * D * D
-            fm = np.where((T > 0) & (P > 0), T**1.5 / (P * np.sqrt(2.0 * facts.rho * area)), np.nan)
-        elif ct is not None and cp is not None and (facts.J is not None or facts.airspeed_m_s is not None):
-            fm = np.where((ct > 0) & (cp > 0), np.asarray(co.FM(ct, cp), dtype=float), np.nan)
-            low = facts.loaded & facts.still & (fm < _LEAST_MERIT)
-            if enough(low, facts.loaded & facts.still):
-                text = f"figure of merit {np.max(fm[low]):.2g} at most; of a real rotor, {_LEAST_MERIT:g} and more"
-                fix = "10 K_Q taken for K_Q: multiply by 0.1; or the other convention of coefficients"
-                named = facts.named("CP" if cq is None else "CQ")
-                yield Finding("coefficient_tenfold", named, text, fix, rows_of(low), "warning")
-        else:
-            return
+    if T is not None and D is not None and D > 0.0 and shaft is not None:
+        P = np.abs(shaft)
+        area = math.pi / 4.0 * D * D
+        fm = np.where((T > 0) & (P > 0), T**1.5 / (P * np.sqrt(2.0 * facts.rho * area)), np.nan)
+    elif ct is not None and cp is not None and (facts.J is not None or facts.airspeed_m_s is not None):
+        fm = np.where((ct > 0) & (cp > 0), np.asarray(co.FM(ct, cp), dtype=float), np.nan)
+        low = facts.loaded & facts.still & (fm < _LEAST_MERIT)
+        if enough(low, facts.loaded & facts.still):
+            text = f"figure of merit {np.max(fm[low]):.2g} at most; of a real rotor, {_LEAST_MERIT:g} and more"
+            fix = "10 K_Q taken for K_Q: multiply by 0.1; or the other convention of coefficients"
+            named = facts.named("CP" if cq is None else "CQ")
+            yield Finding("coefficient_tenfold", named, text, fix, rows_of(low), "warning")
+    else:
+        return
     odd = facts.loaded & facts.still & (fm > limit * 1.02)
     if enough(odd, facts.loaded):
         rows = np.flatnonzero(odd)

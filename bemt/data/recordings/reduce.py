@@ -161,8 +161,7 @@ def _flow(values: Mapping[str, Array]) -> Array | None:
     v = values.get("airspeed_m_s")
     if v is None or not np.any(np.abs(np.nan_to_num(v)) > 0.0):
         return values.get("J")
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.nan_to_num(v / values["rpm"] * 60.0) if "rpm" in values else None
+    return np.nan_to_num(v / values["rpm"] * 60.0) if "rpm" in values else None
 
 
 def _outliers(rec: Dataset, found: Found) -> None:
@@ -300,14 +299,12 @@ def _numbers(series: Dataset, air: AirOfPoints, D: float) -> Dataset:
     if rpm is not None and np.any(np.isfinite(air.a_sound)):
         more["M_tip"] = np.asarray(co.M_tip(rpm / 60.0, D, air.a_sound), dtype=float)
     if {"CT", "CP"} <= series.values.keys():
-        with np.errstate(all="ignore"):
-            fm = np.asarray(co.FM(series.CT, series.CP, np.nan_to_num(V)), dtype=float)
-            share = np.hypot(1.5 * series.u_CT / series.CT, series.u_CP / series.CP)
+        fm = np.asarray(co.FM(series.CT, series.CP, np.nan_to_num(V)), dtype=float)
+        share = np.hypot(1.5 * series.u_CT / series.CT, series.u_CP / series.CP)
         more["FM"], u_more["FM"] = fm, np.abs(fm * share)
     if {"thrust_N", "power_W"} <= series.values.keys():
-        with np.errstate(all="ignore"):
-            ratio = np.where(series.power_W > 0, series.thrust_N / series.power_W, np.nan)
-            share = np.hypot(series.u_thrust_N / series.thrust_N, series.u_power_W / series.power_W)
+        ratio = np.where(series.power_W > 0, series.thrust_N / series.power_W, np.nan)
+        share = np.hypot(series.u_thrust_N / series.thrust_N, series.u_power_W / series.power_W)
         more["efficacy_N_W"], u_more["efficacy_N_W"] = ratio, np.abs(ratio * share)
     u_more = {k: np.where(np.isfinite(v), v, np.nan) for k, v in u_more.items()}
     return replace(series, values={**series.values, **more}, u={**series.u, **u_more})

@@ -131,16 +131,10 @@ def _read_as(file: str) -> dict[str, str]:
     return {units.split_suffix(name)[0]: found.headings[was] for name, was in own.items() if was in found.headings}
 
 
-def write_recording(
-    file: str, out: str, unit: Iterable[str] = (), column: Iterable[str] = (), sign: Sequence[str] = (),
-    pole_pairs: int | None = None, density_kg_m3: float | None = None, ignore: Sequence[str] = (),
-    rpm: float | None = None, airspeed_m_s: float | None = None,
-) -> Path:  # fmt: skip
+def write_recording(file: str, out: str, **stated: Any) -> Path:
     """Write a recording.toml beside a table of measurements, in the same folder; all faults of the options at once.
 
-    `unit` ``NAME=UNIT``, of a quantity or a heading; `column` ``QUANTITY=HEADING``; `sign` ``QUANTITY=-1``;
-    `pole_pairs` of a speed that counts electrical revolutions; density; `ignore` headings; `rpm` and airspeed
-    that no column has. InputError on what is no column, unit or quantity, and where `out` exists.
+    `stated` as `recording_from` takes it. InputError on what is no column, unit or quantity, and where `out` exists.
     """
     path = Path(out) if out.endswith(".toml") else Path(out) / "recording.toml"
     faults: list[Fault] = []
@@ -148,8 +142,7 @@ def write_recording(
         faults.append(Fault("", "--out", out, f"a file in the folder of {Path(file).name}", "Both stay together"))
     if path.exists():
         faults.append(Fault(path.as_posix(), "", "a file that exists", "a new name", "Add the lines to it by hand"))
-    document = recording_from(file, unit, column, sign, pole_pairs, density_kg_m3, faults, ignore,
-                              rpm, airspeed_m_s)  # fmt: skip
+    document = recording_from(file, **stated, faults=faults)
     write_atomic(path, toml_text(document, "Written by bemt import. Give this file in place of the table."))
     return path
 
@@ -159,7 +152,11 @@ def recording_from(
     pole_pairs: int | None = None, density_kg_m3: float | None = None, faults: Sequence[Fault] = (),
     ignore: Sequence[str] = (), rpm: float | None = None, airspeed_m_s: float | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Tables of a recording.toml from what options say of a table of measurements; their faults come after `faults`."""
+    """Tables of a recording.toml from what options say of a table of measurements; their faults come after `faults`.
+
+    `unit` ``NAME=UNIT``, of a quantity or a heading; `column` ``QUANTITY=HEADING``; `sign` ``QUANTITY=-1``;
+    `pole_pairs` of a speed that counts electrical revolutions; headings to `ignore`; what no column has.
+    """
     faults, table = list(faults), split_table(load_text(file))
     faults += [Fault("", "--ignore", repr(h), f"one of {some(map(repr, table.headings), 12)}")
                for h in ignore if h not in table.headings]  # fmt: skip

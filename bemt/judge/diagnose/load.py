@@ -349,9 +349,10 @@ def _unknown(only: Sequence[str], option: str = "--only") -> list[Fault]:
 def _one_setup(imported: Dataset, path: str) -> None:
     """Refuse a table of several propellers or motors: their points are no one curve."""
     from bemt.data.readers.generic_csv import setups
+    from bemt.data.readers.split import few
 
     for name, kinds in setups(imported.texts, imported.values).items():
-        got = f"{len(kinds)} set-ups: {', '.join(kinds[:4])}" + (", ..." if len(kinds) > 4 else "")
+        got = f"{len(kinds)} set-ups: {few(kinds)}"
         hint = "Put the rows of each into a separate file"
         heading = imported.headings.get(name, name)
         raise InputError(Fault(path, heading, got, "one propeller with one motor", hint))
