@@ -71,11 +71,9 @@ def sniff(head: bytes | str) -> bool:
         return False
     split[0] = heading_cells(lines[0], mark, len(split[1]))
     width = len(split[0])
-    if width < 2:
-        return False
     alike = sum(abs(len(cells) - width) <= 1 for cells in split[1:])
     numbers = sum(any(number(c) is not None or re.fullmatch(r"[+-]?\d+,\d+", c) for c in row) for row in split[1:])
-    return min(alike, numbers) >= 0.5 * (len(split) - 1)
+    return width > 1 and min(alike, numbers) >= 0.5 * (len(split) - 1)
 
 
 def read(path: str | os.PathLike[str]) -> Dataset:

@@ -78,23 +78,17 @@ def run_at(path: str, rpm: float | None = None, airspeed_m_s: float | None = Non
     at = Path(path)
     told = {k: v for k, v in (("rpm", rpm), ("airspeed_m_s", airspeed_m_s)) if v is not None}
     made = at / "run.toml" if (at / "run.toml").is_file() else at
-    if made.is_dir():
-        files = cfd_files(made)
-    elif not made.is_file():
-        return None
-    else:
-        kind = readers.kind_of(made)
-        if kind == "cfd_run":
-            run = readers.read(made, kind)
-            twice = [k for k in told if getattr(run.run, k) not in (None, told[k])]
-            if twice:
-                got = ", ".join(f"{k} {told[k]:g}, where the run has {getattr(run.run, k):g}" for k in twice)
-                raise InputError(Fault(path, "run", got, "one operating point", "Leave out the option"))
-            run = run.model_copy(update={"run": run.run.model_copy(update=told)})
-            return assemble(run, made.parent, path)
-        files = (made,) if kind in PROGRAMS else ()
-        other = made.with_name(_BESIDE.get(made.name, made.name))
-        files += (other,) if files and other != made and other.is_file() else ()
+    kind = readers.kind_of(made) if made.is_file() else ""
+    if kind == "cfd_run":
+        run = readers.read(made, kind)
+        if twice := [k for k in told if getattr(run.run, k) not in (None, told[k])]:
+            got = ", ".join(f"{k} {told[k]:g}, where the run has {getattr(run.run, k):g}" for k in twice)
+            raise InputError(Fault(path, "run", got, "one operating point", "Leave out the option"))
+        run = run.model_copy(update={"run": run.run.model_copy(update=told)})
+        return assemble(run, made.parent, path)
+    files = cfd_files(made) if made.is_dir() else (made,) if kind in PROGRAMS else ()
+    other = made.with_name(_BESIDE[made.name]) if made.name in _BESIDE else made
+    files += (other,) if kind in PROGRAMS and other != made and other.is_file() else ()
     if not files:
         return None
     return assemble(RunToml.model_validate({"run": {"files": tuple(map(str, files)), **told}}), Path(), path)

@@ -56,11 +56,8 @@ _COMMANDS = ("pwm_s", "throttle")
 
 def command_of(rec: Dataset) -> tuple[str, Array] | None:
     """Find the command."""
-    for name in _COMMANDS:
-        v = rec.values.get(name)
-        if v is not None and np.any(np.isfinite(v)):
-            return name, v
-    return None
+    told = ((name, rec.values[name]) for name in _COMMANDS if name in rec.values)
+    return next(((name, v) for name, v in told if np.any(np.isfinite(v))), None)
 
 
 def _held(command: Array) -> bool:
@@ -73,9 +70,8 @@ def _held(command: Array) -> bool:
 def _unlike(rec: Dataset) -> bool:
     """Whether neighbouring rows differ in everything that was measured."""
     steps = []
-    for name in ("rpm", "thrust_N", "torque_Nm", "power_W", "current_A"):
-        v = rec.values.get(name)
-        v = v[np.isfinite(v)] if v is not None else np.empty(0)
+    for v in (rec.values[k] for k in ("rpm", "thrust_N", "torque_Nm", "power_W", "current_A") if k in rec.values):
+        v = v[np.isfinite(v)]
         span = float(np.ptp(np.percentile(v, [5.0, 95.0]))) if v.size >= FEWEST else 0.0
         if span > 0.0:
             steps.append(float(np.median(np.abs(np.diff(v)))) / span)
