@@ -18,7 +18,7 @@ from bemt.tools.flight.balance import LOADED, TOTAL_FREE, at_equal_voltage, axes
 from bemt.tools.flight.change import FlightChange, change_in
 from bemt.tools.flight.identify import Constant, Identified, identify
 from bemt.tools.flight.judge import BesideBalance, FlightVerdict, judge, total_sd
-from bemt.tools.flight.layout import Layout, layout_of, mass_faults
+from bemt.tools.flight.layout import layout_of, mass_faults
 from bemt.tools.flight.log import FlightLog
 from bemt.tools.flight.repeat import Sessions, flight_scatter, sessions
 from bemt.tools.flight.speed_sensor import checked, speed_changes
@@ -193,7 +193,7 @@ def answer_on(
     )  # fmt: skip
 
 
-def _trims(log: FlightLog, placed: Layout | None) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def _trims(log: FlightLog, placed: Array | None) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Balance of the usual drives about the axes of the layout, and each of them over their mean, less 1."""
     usual = _usual(log)
     drives = tuple(map(float, np.exp(usual) / np.exp(usual).mean() - 1.0))
