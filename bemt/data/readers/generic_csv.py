@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.tables import few
 from bemt.data.readers import head_text, load_text, number
 from bemt.data.readers._large import NumberTable, large_table
 from bemt.data.readers._words import NEUTRAL, english
@@ -27,7 +28,6 @@ from bemt.data.readers.split import (
     SplitTable,
     column_numbers,
     decimal_mark,
-    few,
     find_start,
     heading_cells,
     is_comment,

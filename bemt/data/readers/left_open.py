@@ -9,9 +9,9 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from bemt.base import units
+from bemt.base.tables import some
 from bemt.data.readers._words import DIMENSIONS
 from bemt.data.readers.headings import may_be_shaft_speed, meanings, slug, surely_shaft_speed
-from bemt.data.readers.split import some
 
 OWN = {"UNIT": "units", "PAIRS": "number"}
 """What a user puts in place of a mark."""

@@ -20,7 +20,7 @@ import numpy as np
 from bemt.base import unit_errors
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, refuse
-from bemt.base.tables import number_of
+from bemt.base.tables import number_of, some
 from bemt.data.readers import load_text
 from bemt.data.readers._large import NumberTable
 from bemt.data.readers._words import english
@@ -36,7 +36,6 @@ from bemt.data.readers.split import (
     decimal_mark,
     lone_points,
     odd_mark,
-    some,
     split_table,
     with_unit,
 )

@@ -18,10 +18,11 @@ import numpy as np
 from bemt.base import units
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, refuse
+from bemt.base.tables import some
 from bemt.data.readers import Reader, SourceText, head_text, load_text, number
 from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.headings import channel_of, heading
-from bemt.data.readers.split import decimal_mark, some, split_table
+from bemt.data.readers.split import decimal_mark, split_table
 
 LOADS = {"thrust": "force", "torque": "torque"}
 _RADIUS = re.compile(r"r|rad|radius|radial[_ ](position|coordinate|distance)|position\[r\]", re.IGNORECASE)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bemt.base import units
 from bemt.base.errors import Fault
-from bemt.base.tables import number_of
+from bemt.base.tables import number_of, some
 from bemt.data.readers import SourceText, number
 from bemt.data.readers._words import english, quantities
 from bemt.data.readers.unit_text import unit_of
@@ -157,22 +157,6 @@ def is_comment(line: str) -> bool:
     (True, False)
     """
     return bool(_COMMENT.match(line))
-
-
-def some(items: Iterable[object], limit: int = 5) -> str:
-    """First few of many, in words.
-
-    >>> some([1, 2]), some(range(9), 3)
-    ('1, 2', '0, 1, 2 and 6 more')
-    """
-    found = list(items)
-    more = f" and {len(found) - limit} more" if len(found) > limit else ""
-    return ", ".join(map(str, found[:limit])) + more
-
-
-def few(items: Sequence[str], limit: int = 4) -> str:
-    """First few of many, and dots for the others."""
-    return ", ".join(items[:limit]) + (", ..." if len(items) > limit else "")
 
 
 def find_delimiter(lines: Sequence[str]) -> str:
@@ -334,9 +318,11 @@ def _without_ends(
         ends.append(kept.pop())
     named = some((f"{word!r} in line {i}" for i, word in sums), 3)
     last = some((f"{' '.join(filter(None, c))[:60]!r} in line {i}" for i, c in ends[::-1]), 3)
-    what = {f"the headings again (line {some(again)})": again, f"sums of others ({named})": sums,
-            f"remarks at the end ({last})": ends}  # fmt: skip
-    notes += [f"{number_of(len(found), 'line')} left out: {text}" for text, found in what.items() if found]
+    told: tuple[tuple[Sequence[object], str], ...] = (
+        (again, f"the headings again (line {some(again)})"), (sums, f"sums of others ({named})"),
+        (ends, f"remarks at the end ({last})"),
+    )  # fmt: skip
+    notes += [f"{number_of(len(found), 'line')} left out: {what}" for found, what in told if found]
     return kept
 
 

@@ -16,11 +16,11 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.base.averaging import MIN_ROWS, keep_last, relation, revolution_average, steady_average
 from bemt.base.errors import Fault, gathered, refuse
+from bemt.base.tables import some
 from bemt.data import readers
 from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import QUANTITIES
 from bemt.data.readers.headings import CELLS, channel_of, heading, may_be_shaft_speed, meanings
-from bemt.data.readers.split import some
 from bemt.data.recordings.channels import clocks_of
 from bemt.physics.dataset import Dataset
 

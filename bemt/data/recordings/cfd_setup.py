@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from bemt.base.tables import number_text
+from bemt.base.tables import few, number_text
 from bemt.data.readers import number
 from bemt.data.readers.references import Reference
-from bemt.data.readers.split import few
 from bemt.data.recordings.audit import AuditLine, audit, facts_of, number_or
 from bemt.physics.dataset import Dataset
 

@@ -18,10 +18,9 @@ from numpy.typing import ArrayLike
 
 from bemt.base import units
 from bemt.base.arrays import Array
-from bemt.base.tables import number_of
+from bemt.base.tables import few, number_of
 from bemt.data.readers.headings import USUAL, counts_electrical, may_be_shaft_speed, meanings, unit_alone
 from bemt.data.readers.recording import FULL_THROTTLE
-from bemt.data.readers.split import few
 from bemt.physics.dataset import Dataset
 
 HUGE = 1e9

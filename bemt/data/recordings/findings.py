@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.data.readers.split import some
+from bemt.base.tables import some
 from bemt.data.recordings.channels import asks, named, names_of
 from bemt.physics.air import LIQUID
 from bemt.physics.dataset import Dataset

@@ -18,12 +18,12 @@ import numpy as np
 
 from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError, system_fault
+from bemt.base.tables import some
 from bemt.data import readers as importers
 from bemt.data.readers.cfd_run import KIND as RUN
 from bemt.data.readers.cfd_run import RunHead, RunToml
 from bemt.data.readers.left_open import one_step
 from bemt.data.readers.marks import EXPORT
-from bemt.data.readers.split import some
 from bemt.data.readers.uiuc import NO_SPEED
 from bemt.data.recordings import cfd_run
 from bemt.data.recordings.adapt import (

@@ -21,9 +21,8 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.base.tables import number_of
+from bemt.base.tables import number_of, some
 from bemt.base.units import ZERO_CELSIUS
-from bemt.data.readers.split import some
 from bemt.data.recordings.channels import (
     LOADS,
     DroppedCells,

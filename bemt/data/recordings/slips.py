@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 
 from bemt.base import unit_errors
 from bemt.base.arrays import Array
+from bemt.base.tables import some
 from bemt.data.readers.samples import MOST_RPM_PER_V
-from bemt.data.readers.split import some
 from bemt.data.recordings.findings import MOTOR_EFFICIENCY, Facts, Finding, check_for
 from bemt.physics import k1k2 as empirical
 

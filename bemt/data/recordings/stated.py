@@ -13,7 +13,7 @@ import numpy as np
 from bemt.base import units
 from bemt.base.action import did_you_mean
 from bemt.base.errors import Fault, InputError, refuse
-from bemt.base.tables import write_atomic
+from bemt.base.tables import some, write_atomic
 from bemt.base.toml import validated
 from bemt.base.toml_text import Collector
 from bemt.data.readers import generic_csv, load_text
@@ -21,7 +21,7 @@ from bemt.data.readers.cfd_run import toml_text
 from bemt.data.readers.headings import counts_electrical, heading, meanings, surely_shaft_speed
 from bemt.data.readers.recording_toml import QUANTITIES as CHANNELS
 from bemt.data.readers.recording_toml import RecordingToml
-from bemt.data.readers.split import decimal_mark, some, split_table
+from bemt.data.readers.split import decimal_mark, split_table
 from bemt.data.readers.unit_text import BY_THE_CASE, TWO_MEANINGS, unit_for
 from bemt.data.recordings.cfd_options import Facts, gather, in_case
 from bemt.data.recordings.channels import named, names_of

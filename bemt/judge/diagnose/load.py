@@ -348,8 +348,8 @@ def _unknown(only: Sequence[str], option: str = "--only") -> list[Fault]:
 
 def _one_setup(imported: Dataset, path: str) -> None:
     """Refuse a table of several propellers or motors: their points are no one curve."""
+    from bemt.base.tables import few
     from bemt.data.readers.generic_csv import setups
-    from bemt.data.readers.split import few
 
     for name, kinds in setups(imported.texts, imported.values).items():
         got = f"{len(kinds)} set-ups: {few(kinds)}"

@@ -168,8 +168,9 @@ def answer_on(
     moved, turned = shaken(shake, calm), speed_changes(log, healthy)
     changed, days = change_in(log, placed), sessions(log, healthy, stated_days, day)
     mass = _by_healthy(log, found, healthy, healthy_mass_kg)
+    trims: tuple[tuple[float, ...], tuple[float, ...]] = (), ()
     if mine is None:
-        judged, balance, drives = _not_flown(log), (), ()
+        judged = _not_flown(log)
     else:
         flown = [(k, x) for k, h in enumerate(healthy) if (x := features(h)) is not None]
         upset = [bool(shaken(calm[k], [*calm[:k], *calm[k + 1 :]])) or change_in(healthy[k], placed) is not None
@@ -185,9 +186,9 @@ def answer_on(
         if mass is not None and judged.next.kind == "run" and judged.said.verdict == "none":
             step = "see whether payload and battery explain the mass; a full battery and a hover of 30 s show the rest"
             judged = replace(judged, next=replace(judged.next, text=step))
-        balance, drives = _trims(log, placed)
+        trims = _trims(log, placed)
     return FlightAnswer(
-        log, found, judged, air, balance, drives, _limited(log), changed, shake, moved,
+        log, found, judged, air, *trims, _limited(log), changed, shake, moved,
         float(np.exp(shake.level - past.mean())) if past.size else float("nan"), turned, inflow(log), mass,
         simulator=simulator_constants(log, found), curve=thrust_curve(log), days=days, demand=_demand(log),
     )  # fmt: skip
