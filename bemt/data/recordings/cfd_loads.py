@@ -380,11 +380,15 @@ def _on_shaft(run: OpenRun, pool: Mapping[str, LoadColumn], zones: Sequence[str]
     named = [z for z in moment if TURNS.search(z)]
     whole = sum(moment[z] for z in named or moment)
     against = [z for z in moment if moment[z] * whole < 0.0]
-    if len(moment) == len(zones) and sum(abs(moment[z]) for z in against) <= _SLIGHT * abs(whole):
+
+    def counts(some: Sequence[str]) -> bool:
+        return sum(abs(moment[z]) for z in some) > _SLIGHT * abs(whole)
+
+    if len(moment) == len(zones) and not counts(against):
         return list(moment)
     shaft = named or sorted(moment, key=lambda z: -abs(moment[z]))[:1]
     doubt = [z for z in moment if (z in shaft) == (z in against)] if named else [z for z in moment if z not in shaft]
-    if sum(abs(moment[z]) for z in doubt) > _SLIGHT * abs(whole):
+    if counts(doubt):
         got = "torque of " + ", ".join(f"{z} {m:+.4g}" for z, m in moment.items())
         hint = f"--rotor-zones {','.join(z for z in shaft if z not in doubt)}: those on one shaft; thrust counts all"
         run.fault(None, "zones", got, "the zones that turn with the shaft", hint)
