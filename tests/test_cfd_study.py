@@ -17,7 +17,7 @@ from bemt.data.recordings.cfd_options import run_from, write_run
 from bemt.data.recordings.cfd_run import assemble, run_at
 from bemt.data.recordings.cfd_setup import CfdRun, grid_floor
 from bemt.data.recordings.channels import named
-from bemt.data.recordings.grid_study import are_grids, by_grid, together
+from bemt.data.recordings.grids import are_grids, by_grid, together
 from bemt.data.recordings.load import as_dataset, import_file, import_files
 from bemt.judge.actions import compare
 from bemt.judge.diagnose.load import load_all

@@ -80,6 +80,7 @@ MAY: dict[str, set[str]] = {
     "bemt.data.recordings.load": {"files"},
     "bemt.rotors.k1k2_points|bemt.rotors.k1k2_calibration": {"files"},
     "bemt.data.recordings.cfd_files|bemt.data.recordings.cfd_options|bemt.data.recordings.cfd_run": {"files"},
+    "bemt.data.recordings.stated": {"files"},
     "bemt.results.sweep.grid|bemt.results.sweep.dask_engine|bemt.results.sweep.store|bemt.rotors.validate.points": {
         "files"
     },

@@ -45,6 +45,22 @@ def speed_text(rpm: float | None) -> str:
     return "-" if rpm is None or math.isnan(rpm) else f"{rpm:.6g}"
 
 
+def some(items: Iterable[object], limit: int = 5) -> str:
+    """First few of many, in words.
+
+    >>> some([1, 2]), some(range(9), 3)
+    ('1, 2', '0, 1, 2 and 6 more')
+    """
+    found = list(items)
+    more = f" and {len(found) - limit} more" if len(found) > limit else ""
+    return ", ".join(map(str, found[:limit])) + more
+
+
+def few(items: Sequence[str], limit: int = 4) -> str:
+    """First few of many, and dots for the others."""
+    return ", ".join(items[:limit]) + (", ..." if len(items) > limit else "")
+
+
 def number_of(count: SupportsInt, noun: str) -> str:
     """Count things in words, singular for one.
 

@@ -111,6 +111,7 @@ def import_(
     from bemt.base.given import paths_text
     from bemt.data.recordings import cfd_options, load
     from bemt.data.recordings.adapt import asked
+    from bemt.data.recordings.stated import filled, write_recording
 
     if picture is not None and case is None:
         raise InputError(Fault("--picture", "", "no case", "--case CASE, whose band is drawn"))
@@ -134,8 +135,6 @@ def import_(
     lines, insist = [], any((*told.values(), *run.values(), left, out is not None, pole_pairs))
     table = names[0] if len(names) == 1 and measured else ""
     if insist and table and out is not None:
-        from bemt.data.recordings.cfd_options import write_recording
-
         facts: dict[str, Any] = {**told, "pole_pairs": pole_pairs, "density_kg_m3": density_kg_m3, "ignore": left}
         written = write_recording(table, os.fspath(out), rpm=rpm, airspeed_m_s=airspeed_m_s, **facts).as_posix()
         kept, said = written, {}
@@ -149,7 +148,7 @@ def import_(
     if measured and not kept and any(v is not None for v in of_tables.values()):
         with suppress(InputError):  # said where it is read
             read = {n: stated.get(n) or load.import_file(n, format, choice) for n in names}
-            stated |= {n: cfd_options.filled(one, **of_tables) for n, one in read.items()}
+            stated |= {n: filled(one, **of_tables) for n, one in read.items()}
     speed = None if choice.period is None else 60.0 / choice.period
     made = cfd_options.run_from(names, rpm=speed, revolutions=revolutions, **(run | told), ignore=left)
     rotor = None if case is None else _rotor(case)

@@ -60,10 +60,8 @@ def sniff_cfd_post_csv(head: bytes | str) -> bool:
 
     >>> sniff_cfd_post_csv("[Name]\nBlade\n\n[Data]\nX [ m ], Y [ m ]"), sniff_cfd_post_csv("[propeller]\nname = 1")
     (True, False)
-    >>> sniff_cfd_post_csv("Expression, Value\nThrust, 2.61 [kg m s^-2]\n")
-    True
-    >>> sniff_cfd_post_csv("rpm,thrust [N]\n6000,2.61\n")
-    False
+    >>> [sniff_cfd_post_csv(t) for t in ("Expression, Value\nThrust, 2.6 [kg m s^-2]\n", "rpm,thrust [N]\n6,2.6\n")]
+    [True, False]
     """
     lines = [line for line in head_lines(head) if not line.startswith("#")]
     return bool(lines) and (lines[0].rstrip(",;") in ("[Name]", "[Data]") or _lists_expressions(lines[:2]))
@@ -195,12 +193,9 @@ _PARAMETER = re.compile(r"\s*(?:(P\d+) - )?(.*?)\s*(?:\[[\s-]*([^\]]*?)\s*\])?\s
 def sniff_design_points(head: bytes | str) -> bool:
     r"""Tell whether the first line that is no comment heads a table of design points.
 
-    >>> sniff_design_points("# ,P1 - rpm [rev min^-1]\nName,P1\nDP 0,8000")
-    True
-    >>> sniff_design_points("Design Points,rpm,T-op\nDP1,1,2")
-    True
-    >>> sniff_design_points("Name,a"), sniff_design_points("Name,rpm [rpm]\nDP0,6000")
-    (False, True)
+    >>> heads = "# ,P1 - rpm [rev min^-1]\nName,P1\nDP 0,8", "Design Points,rpm,T-op\nDP1,1,2", "Name,rpm [rpm]\nDP0,6"
+    >>> [sniff_design_points(head) for head in (*heads, "Name,a")]
+    [True, True, True, False]
     """
     lines = [line for line in head_lines(head) if not line.startswith("#")]
     labelled = len(lines) > 1 and _NAMED.match(lines[0]) and _POINT.match(lines[1])
@@ -233,8 +228,11 @@ def read_design_points(path: str | os.PathLike[str]) -> Dataset:
             rows.append(ExportRow(line, tuple(cell or "nan" for cell in cells)))
     if not names:
         source.refuse("", "no header", "a line such as Name,P1,P2")
-    heads = ((n, told.get(n) or _headed(n)) for n in names)
-    columns = [Column(words, si_unit(own) or own) for n, (words, unit) in heads for own in (unit or units.get(n, ""),)]
+    columns = []
+    for name in names:
+        words, unit = told.get(name) or _headed(name)
+        unit = unit or units.get(name, "")
+        columns.append(Column(words, si_unit(unit) or unit))
     table = numeric_table(source, columns, rows, mark != ",")
     texts = {"name": tuple(labels)} if len(labels) == len(table.values) else {}
     about = {**source.about, "clock": "none"}

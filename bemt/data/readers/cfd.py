@@ -269,6 +269,24 @@ def _spikes(column: Column, values: Array) -> list[str]:
     return [note + (": start-up or damage" if at < 0.1 * values.size else ": damage?")]
 
 
+def _in_order(
+    columns: Sequence[Column], values: Array, time: int | None, step: int | None, notes: list[str]
+) -> NDArray[np.intp]:
+    """Rows of a history in the order of its clocks, of what a restart repeats the last, (N,)."""
+    index: NDArray[np.intp] = np.arange(len(values))
+    alive = np.isfinite(values[:, [column.role == "value" for column in columns]]).any(axis=1)
+    at = time if time is not None else step
+    if at is not None and alive.any() and np.any(np.diff(values[:, at]) < 0):  # no value, no order
+        index = index[alive]
+    for k in (k for k in (time, step) if k is not None):
+        if time not in (None, k) and np.any(np.diff(values[index, k]) < 0):
+            notes.append(f"{columns[k].name} goes back while {columns[at or 0].name} goes on: a restart")
+            continue
+        kept, more = keep_last(values[index, k], columns[k].name)
+        index, notes[len(notes) :] = index[kept], more
+    return index
+
+
 def history(
     format: str, source: SourceText, columns: Sequence[Column], table: ExportTable,  # noqa: A002
     warnings: Sequence[str] = (), provenance: Mapping[str, str] | None = None,
@@ -279,40 +297,23 @@ def history(
     by iterations that of its last fifth.
     """
     roles = [column.role for column in columns]
-    time = _clock(table.values, roles, "time")
-    step = _clock(table.values, roles, "step")
+    time, step = _clock(table.values, roles, "time"), _clock(table.values, roles, "step")
     notes = [*warnings, *table.warnings]
-    index: NDArray[np.intp] = np.arange(len(table.values))
-    alive = np.isfinite(table.values[:, [role == "value" for role in roles]]).any(axis=1)
-    at = time if time is not None else step
-    if at is not None and alive.any() and np.any(np.diff(table.values[:, at]) < 0):  # no value, no order
-        index = index[alive]
-    if time is not None:
-        kept, more = keep_last(table.values[index, time], columns[time].name)
-        index = index[kept]
-        notes += more
-    if step is not None:
-        steps = table.values[index, step]
-        if time is None or not np.any(np.diff(steps) < 0):
-            kept, more = keep_last(steps, columns[step].name)
-            index = index[kept]
-            notes += more
-        else:
-            notes.append(f"{columns[step].name} goes back while {columns[time].name} goes on: a restart")
+    index = _in_order(columns, table.values, time, step, notes)
     clock = "time" if time is not None else "iteration"
     names = unique([column.name for column in columns])
     channels: dict[str, Channel] = {}
     for k, (name, column) in enumerate(zip(names, columns, strict=True)):
         values = table.values[index, k]
+        channels[name] = Channel(values, column.unit)
         if column.role != "value":
-            channels[name] = Channel(values, column.unit)
             continue
         average = steady_average(values, 1.0) if clock == "time" else steady_average(values)
         over = f"all {average.rows} rows, start-up included" if clock == "time" else f"last {average.rows} rows"
-        mean = None if average.mean is None else Mean(average.mean, over, average.drift)
-        channels[name] = Channel(values, column.unit, mean)
         notes += _spikes(column, values)
-        if average.mean is None and average.problem:
+        if average.mean is not None:
+            channels[name] = Channel(values, column.unit, Mean(average.mean, over, average.drift))
+        elif average.problem:
             notes.append(f"{name}: no mean: {average.problem}")
     about = {**source.about, **(provenance or {}), "clock": clock}
     about["clock_channels"] = "\t".join(n for n, c in zip(names, columns, strict=True) if c.role in ("time", "step"))

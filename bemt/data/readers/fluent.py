@@ -64,10 +64,8 @@ class _Named(NamedTuple):
 def sniff_fluent_forces(head: bytes | str) -> bool:
     r"""Tell whether a title of forces is followed by a line of zones, and this is no transcript.
 
-    >>> sniff_fluent_forces("Forces\n      Forces (n)\nZone  Pressure  Viscous  Total\n")
-    True
-    >>> sniff_fluent_forces("Zone,Pressure")
-    False
+    >>> [sniff_fluent_forces(t) for t in ("Forces\n  Forces (n)\nZone  Pressure  Viscous  Total\n", "Zone,Pressure")]
+    [True, False]
     """
     lines = head_lines(head, 60)
     titles = [k for k, line in enumerate(lines) if _TITLE.fullmatch(line)]
@@ -232,12 +230,9 @@ _AVERAGE = re.compile(r"\(Average Over\)\"?\s+(\d+)")
 def sniff_fluent_transcript(head: bytes | str) -> bool:
     r"""Tell whether a text shows marks of a Fluent console.
 
-    >>> sniff_fluent_transcript("  iter  continuity  x-velocity  time/iter\n 1 1.0 1.0 0:00:01 9")
-    True
-    >>> sniff_fluent_transcript("iteration,continuity")
-    False
-    >>> sniff_fluent_transcript("  Moment   [N m]\n------------ ----------\n  blade   -0.18\n")
-    True
+    >>> told = "  iter  continuity  time/iter\n 1 1.0 0:0:1 9", "  Moment   [N m]\n-------- --------\n  blade   -0.18\n"
+    >>> [sniff_fluent_transcript(text) for text in (*told, "iteration,continuity")]
+    [True, True, False]
     """
     lines = head_lines(head, 400)
     if any(_MARKS.search(line) for line in lines):

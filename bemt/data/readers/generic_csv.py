@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.tables import few
 from bemt.data.readers import head_text, load_text, number
 from bemt.data.readers._large import NumberTable, large_table
 from bemt.data.readers._words import NEUTRAL, english
@@ -70,11 +71,9 @@ def sniff(head: bytes | str) -> bool:
         return False
     split[0] = heading_cells(lines[0], mark, len(split[1]))
     width = len(split[0])
-    if width < 2:
-        return False
     alike = sum(abs(len(cells) - width) <= 1 for cells in split[1:])
     numbers = sum(any(number(c) is not None or re.fullmatch(r"[+-]?\d+,\d+", c) for c in row) for row in split[1:])
-    return min(alike, numbers) >= 0.5 * (len(split) - 1)
+    return width > 1 and min(alike, numbers) >= 0.5 * (len(split) - 1)
 
 
 def read(path: str | os.PathLike[str]) -> Dataset:
@@ -129,19 +128,17 @@ def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
     if "time_s" in build.channels:
         build.flag_spikes(*(k for k, c in build.channels.items() if k != "time_s" and c.unit not in ("", "-")))
     only_ones(build)
-    if len(speeds) == 1 and speeds[0] not in ("rpm", "electrical_rpm", "optical_rpm", "motor_rpm", "ESC_rpm"):
-        own = build.headings[speeds[0]]
+    own = build.headings[speeds[0]] if len(speeds) == 1 else ""  # of the only speed
+    if own and speeds[0] not in ("rpm", "electrical_rpm", "optical_rpm", "motor_rpm", "ESC_rpm"):
         line = f'[columns] rpm = {{ column = "{own}", unit = "rpm" }}'
         text = f"{own!r} is not taken for the speed of the rotor; if it is, head it rpm, or write {line}"
         build.warnings.append(text)
     electrical(build)
-    if len(speeds) == 1 and counts_electrical(build.headings[speeds[0]]):
-        own = build.headings[speeds[0]]
+    if own and counts_electrical(own):
         build.warnings.append(f"{own!r} counts electrical revolutions: the speed of the rotor is that over pole pairs")
         build.asks.append("--pole-pairs PAIRS")
     for name, kinds in setups(build.texts).items():
-        shown = ", ".join(kinds[:4]) + (", ..." if len(kinds) > 4 else "")
-        build.warnings.append(f"{len(kinds)} set-ups in one file, distinguished by {name!r}: {shown}")
+        build.warnings.append(f"{len(kinds)} set-ups in one file, distinguished by {name!r}: {few(kinds)}")
     build.check_magnitudes()
     loads = {"thrust_N", "torque_Nm"} & build.channels.keys()
     if loads and (speeds or {"time_s", "pulse_width_s", "throttle"} & build.channels.keys()):
@@ -196,9 +193,8 @@ def only_ones(build: Builder) -> None:
     for name, words in _ONLY.items():
         quantity, unit = name.rsplit("_", 1)
         same = [k for k, c in build.channels.items() if c.unit == unit and k != "duct_thrust_N"]
-        ours = [
-            k for k in same if set(english(build.headings[k])) - {unit.lower()} <= set(words.split()) | NEUTRAL | _MARKS
-        ]
+        usual = {unit.lower(), *words.split(), *NEUTRAL, *_MARKS}
+        ours = [k for k in same if usual.issuperset(english(build.headings[k]))]
         if name in same or not ours or any(USUAL.get(k) == name for k in build.channels):
             continue
         if len(same) == 1:
@@ -208,7 +204,13 @@ def only_ones(build: Builder) -> None:
             shown, most = ", ".join(repr(build.headings[k]) for k in ours[:6]), build.ask(quantity, ours)
             build.warnings.append(f"which of {shown} is the {quantity}? {most!r} is the largest")
     told = {USUAL.get(k, k) for k in build.channels}
-    for quantity, unit, other in _AIR_UNITS if told & {"rpm", *_ONLY} else ():
+    if told & {"rpm", *_ONLY}:
+        _ask_for_air(build, told)
+
+
+def _ask_for_air(build: Builder, told: set[str]) -> None:
+    """Ask about columns that may be the airspeed or the state of the air, where nothing makes up for it."""
+    for quantity, unit, other in _AIR_UNITS:
         name = f"{quantity}_{unit}"
         ours = [k for k, c in build.channels.items() if c.unit == unit and may_be(quantity, build.headings[k])]
         ours = [k for k in ours if plausible(name, build.channels[k].values)]

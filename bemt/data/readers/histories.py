@@ -90,33 +90,8 @@ class Layout:
 
     def read(self, path: str | os.PathLike[str]) -> Dataset:
         """Read a history: headings that may be repeated by a restart, rows, lines to skip; all faults at once."""
-        source = load_text(path)
-        names: list[str] = []
-        about, rows, repeated, early = {"title": ""}, list[ExportRow](), list[int](), False
-        cells: Cells = lambda text: cells_of(text, self.mark)  # noqa: E731
-        for line, raw in enumerate(source.lines, 1):
-            text = raw.strip()
-            found = self.header(text) if text else None
-            if found is not None:
-                if names and list(found) != names:
-                    got, expected = f"another header ({', '.join(found)})", f"the first one ({', '.join(names)})"
-                    source.add(line, got, expected, "Split the file there")
-                    break
-                repeated += [line] if names else []
-                names = names or list(found)
-                cells = self.cells(names) if self.cells else cells
-            elif not text or re.match(self.skip, text):
-                if setting := re.fullmatch(self.setting, text):
-                    about[setting[1]] = setting[2].strip()
-                else:
-                    about["title"] = about["title"] or text.strip('"# \t')
-            elif names:
-                rows.append(ExportRow(line, cells(text)))
-            elif not early:
-                early = True
-                source.add(line, repr(text[:60]), f"a header such as {self.example}", self.hint)
-        if not names and not early:
-            source.add("", "no header", f"a line such as {self.example}")
+        source, about = load_text(path), {"title": ""}
+        names, rows, repeated = self._parted(source, about)
         if names and not rows:
             source.add("", f"a header ({', '.join(names)}) and no rows", "one row or more", "Did the run write a step?")
         if not rows:
@@ -130,6 +105,36 @@ class Layout:
         if self.finish is not None:
             columns, table = self.finish(columns, table, notes, about)
         return history(self.KIND, source, columns, table, notes, about)
+
+    def _parted(self, source: SourceText, about: dict[str, str]) -> tuple[list[str], list[ExportRow], list[int]]:
+        """Names of the columns, rows, and lines that repeat the header; what other lines state goes into `about`."""
+        names, rows, repeated, early = list[str](), list[ExportRow](), list[int](), False
+        cells: Cells = lambda text: cells_of(text, self.mark)  # noqa: E731
+        for line, raw in enumerate(source.lines, 1):
+            text = raw.strip()
+            found = self.header(text) if text else None
+            if found is not None and not names:
+                names = list(found)
+                cells = self.cells(names) if self.cells else cells
+            elif found is not None and list(found) == names:
+                repeated.append(line)
+            elif found is not None:
+                got, expected = f"another header ({', '.join(found)})", f"the first one ({', '.join(names)})"
+                source.add(line, got, expected, "Split the file there")
+                break
+            elif not text or re.match(self.skip, text):
+                if setting := re.fullmatch(self.setting, text):
+                    about[setting[1]] = setting[2].strip()
+                else:
+                    about["title"] = about["title"] or text.strip('"# \t')
+            elif names:
+                rows.append(ExportRow(line, cells(text)))
+            elif not early:
+                early = True
+                source.add(line, repr(text[:60]), f"a header such as {self.example}", self.hint)
+        if not names and not early:
+            source.add("", "no header", f"a line such as {self.example}")
+        return names, rows, repeated
 
 
 # ---------------------------------------------------------------- Fluent

@@ -252,10 +252,8 @@ _TRIP = re.compile(r"xtrf\s*=\s*(\S+)\s*\(top\)\s*(\S+)\s*\(bottom\)")
 def sniff_polar_xfoil(head: bytes | str) -> bool:
     r"""Tell whether a file begins like an XFOIL polar.
 
-    >>> sniff_polar_xfoil("       XFOIL         Version 6.99\n\n Calculated polar for: NACA 4412\n")
-    True
-    >>> sniff_polar_xfoil("alpha,cl,cd")
-    False
+    >>> [sniff_polar_xfoil(t) for t in ("  XFOIL  Version 6.99\n\n Calculated polar for: NACA 4412\n", "alpha,cl,cd")]
+    [True, False]
     """
     text = head_text(head)
     return _TITLE.search(text) is not None or _SITE.match(text) is not None

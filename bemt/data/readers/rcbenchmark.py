@@ -127,35 +127,17 @@ def _mode(build: Builder) -> str:
 
 
 def _speeds(build: Builder) -> None:
-    """Flags of the two speeds, each for itself."""
-    load = build.at("thrust_N")
-    seen = 0
+    """Flags of the speeds, each for itself, and what the file does not say of them."""
+    seen = False
     for name in [n for n in build.channels if n.startswith(_SPEEDS) or n == "rpm"]:
-        v = build.at(name)
-        assert v is not None
-        if not np.any(v[np.isfinite(v)] != 0.0):
+        v = build.channels[name].values
+        if np.any(v[np.isfinite(v)] != 0.0):
+            seen = True
+            _flag_speed(build, name)
+        else:
             build.warnings.append(f"{name} is 0 in every row: the sensor measured nothing; ignored")
-            continue
-        seen += 1
-        zero = v == 0.0
-        if load is not None and np.any(np.isfinite(load)):
-            loaded = zero & (np.abs(load) > 0.05 * np.nanmax(np.abs(load))) & ~_no_current(build)
-            build.flag(np.flatnonzero(loaded), f"{name} is 0 under thrust")
-            zero &= ~loaded
-        build.flag(np.flatnonzero(zero), f"{name} is 0")
-        build.flag(np.flatnonzero(v < 0.0), f"{name} is negative")
-        moving = np.where(v > 0.0, v, np.nan)
-        wild = spikes(moving) | _wild(moving, load)
-        volt = build.at("voltage_V")
-        if volt is not None:
-            wild |= moving > MOST_RPM_PER_V * np.where(volt > 0.5, volt, np.inf)
-        build.flag(np.flatnonzero(wild), f"spike of {name}")
     electrical = next((n for n in build.channels if n.startswith("electrical_rpm")), None)
-    electric, optical = (build.at(n) for n in _SPEEDS)
-    agree = False
-    if electric is not None and optical is not None and np.count_nonzero(good := (electric > 0) & (optical > 0)) >= 3:
-        agree = abs(float(np.median(electric[good] / optical[good])) - 1.0) < 0.05
-    if electrical and seen and not agree:
+    if electrical and seen and not _agree(*(build.at(n) for n in _SPEEDS)):
         build.warnings.append(
             f"{electrical} is derived from the motor's phases with the number of poles set in the stand's software, "
             "which the file does not state; check it against an optical speed, or state it in a recording.toml"
@@ -163,6 +145,30 @@ def _speeds(build: Builder) -> None:
     if "rpm" in build.channels and seen:
         note = "rpm: the file names neither its sensor nor the number of poles set in the stand's software"
         build.warnings.append(note)
+
+
+def _flag_speed(build: Builder, name: str) -> None:
+    """Flag values of a speed that it cannot have had."""
+    v, load, volt = build.channels[name].values, build.at("thrust_N"), build.at("voltage_V")
+    zero = v == 0.0
+    if load is not None and np.any(np.isfinite(load)):
+        loaded = zero & (np.abs(load) > 0.05 * np.nanmax(np.abs(load))) & ~_no_current(build)
+        build.flag(np.flatnonzero(loaded), f"{name} is 0 under thrust")
+        zero &= ~loaded
+    build.flag(np.flatnonzero(zero), f"{name} is 0")
+    build.flag(np.flatnonzero(v < 0.0), f"{name} is negative")
+    moving = np.where(v > 0.0, v, np.nan)
+    wild = spikes(moving) | _wild(moving, load)
+    if volt is not None:
+        wild |= moving > MOST_RPM_PER_V * np.where(volt > 0.5, volt, np.inf)
+    build.flag(np.flatnonzero(wild), f"spike of {name}")
+
+
+def _agree(electric: Array | None, optical: Array | None) -> bool:
+    """Whether two sensors of the speed say the same."""
+    if electric is None or optical is None or np.count_nonzero(good := (electric > 0) & (optical > 0)) < 3:
+        return False
+    return abs(float(np.median(electric[good] / optical[good])) - 1.0) < 0.05
 
 
 def _no_current(build: Builder) -> np.ndarray:

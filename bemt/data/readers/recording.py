@@ -6,7 +6,6 @@ a number, a text, or NaN with a flag on its row. Headings are read in :mod:`bemt
 
 from __future__ import annotations
 
-import difflib
 import os
 import re
 import shlex
@@ -18,23 +17,15 @@ from typing import Any
 
 import numpy as np
 
-from bemt.base import unit_errors, units
+from bemt.base import unit_errors
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, refuse
-from bemt.base.tables import number_of
+from bemt.base.tables import number_of, some
 from bemt.data.readers import load_text
 from bemt.data.readers._large import NumberTable
-from bemt.data.readers._words import DIMENSIONS, english
-from bemt.data.readers.headings import (
-    CELLS,
-    Heading,
-    heading,
-    in_usual_unit,
-    may_be_shaft_speed,
-    meanings,
-    slug,
-    surely_shaft_speed,
-)
+from bemt.data.readers._words import english
+from bemt.data.readers.headings import CELLS, Heading, heading, in_usual_unit, slug
+from bemt.data.readers.left_open import NEEDED, OWN, asked, nearest, one_step
 from bemt.data.readers.samples import Channel, clock_seconds, dataset, spikes
 from bemt.data.readers.split import (
     MOST_ODD,
@@ -45,7 +36,6 @@ from bemt.data.readers.split import (
     decimal_mark,
     lone_points,
     odd_mark,
-    some,
     split_table,
     with_unit,
 )
@@ -188,64 +178,73 @@ class Builder:
     def add(self, index: int, head: Heading, sign: float = 1.0) -> str:
         """Add column `index` as a channel or a text; gives its name ("" when the column is empty)."""
         values, bad, empty = self.table.numbers(index, self.decimal)
-        label = head.text or f"column {index + 1}"
+        label, filled = head.text or f"column {index + 1}", len(values) - empty
         if empty and (errors := sum(cell.lower() in SHEET_ERRORS for cell in self.table.cells(index))):
             note = f"column {label!r}: {number_of(errors, 'cell')} with an error of the spreadsheet, taken as empty"
             self.warnings.append(note)
-        if empty == len(values):
+        if not filled:
             self.empty.append(repr(label))
             return ""
-        if self.decimal == "." and self._has_commas(index, label, bad):
+        if self._other_mark(index, label, bad):
             return ""
-        if self.decimal == "," and isinstance(self.table, SplitTable):
-            for i in lone_points(self.table.cells(index))[:1]:
-                got = f"{self.table.cell(i, index)!r} among the decimal commas of {label!r}"
-                hint = "Thousands or decimals? Write it with a comma, or without a mark"
-                self.fault(f"{self.line(i)}:{index + 1}", got, "one decimal mark", hint)
         if bad and (stated := self._one_unit(index, bad)):
-            values, bad, _ = column_numbers(
-                [(with_unit(c) or (c, ""))[0] for c in self.table.cells(index)], self.decimal
-            )
+            cells = [(with_unit(c) or (c, ""))[0] for c in self.table.cells(index)]
+            values, bad, _ = column_numbers(cells, self.decimal)
             head = heading(f"{head.text} ({stated})") if head.unit is None or head.name == "throttle" else head
             head = replace(head, text=label)
             self.warnings.append(f"column {label!r}: its cells say the unit, {stated}")
         known = head.unit is not None and head.unit_name not in ("", "-")
-        if len(bad) > (MOST_ODD_OF_UNIT if known else MOST_ODD) * (len(values) - empty):
-            return self._add_text(index, head, label, bad, len(values) - empty)
+        if len(bad) > (MOST_ODD_OF_UNIT if known else MOST_ODD) * filled:
+            return self._add_text(index, head, label, bad, filled)
         name = self.free(head.name)
         if bad:
-            cells = ((i, self.table.cell(i, index)[:20]) for i in bad)
-            words = some((f"{cell!r} at {self.line(i)}:{index + 1}" for i, cell in cells), 3)
-            self.flag(bad, f"{name}: no number", f": {words}; NaN there")
+            odd = some((f"{self.table.cell(i, index)[:20]!r} at {self.line(i)}:{index + 1}" for i in bad), 3)
+            self.flag(bad, f"{name}: no number", f": {odd}; NaN there")
         if head.told:
             self.warnings.append(head.told)
-        if head.unit is None:
-            running = not head.text and np.array_equal(values, values[0] + np.arange(len(values)))  # as pandas writes
-            if not (running or CELLS.search(label.partition("[")[0].strip())):  # a count needs none
-                self.unitless.append(f"{label!r}" + (f" ({head.doubt})" if head.doubt else ""))
-        elif head.unit.suffix != "rpm" and (head.unit.factor, head.unit.offset) != (1.0, 0.0):
-            with np.errstate(over="ignore"):
-                values = values * head.unit.factor + head.unit.offset
-            self.declared[name] = head.unit.factor
-            over = np.isinf(values)
-            self.flag(np.flatnonzero(over), f"{name}: too large a number", "; NaN there")
-            values[over] = np.nan
-        if head.unit is not None and head.unit.dimension == "fraction":
-            self.units_stated.add(name)
+        values = self._in_si(name, head, label, values)
         if head.name != name:
             self.warnings.append(f"column {label!r} has the name of another column: kept as {name}")
         self.channels[name] = Channel(values if sign == 1.0 else values * sign, head.unit_name)
         self.headings[name] = head.text
         return name
 
-    def _has_commas(self, index: int, label: str, bad: Sequence[int]) -> bool:
-        """Whether cells of a column have a comma for a point, which is a fault."""
+    def _in_si(self, name: str, head: Heading, label: str, values: Array) -> Array:
+        """Values of a channel in SI, (N,); as they are, and told, without a unit; rev/min of a speed."""
+        unit = head.unit
+        if unit is None:
+            running = not head.text and np.array_equal(values, values[0] + np.arange(len(values)))  # as pandas writes
+            if not (running or CELLS.search(label.partition("[")[0].strip())):  # a count needs none
+                self.unitless.append(f"{label!r}" + (f" ({head.doubt})" if head.doubt else ""))
+            return values
+        if unit.dimension == "fraction":
+            self.units_stated.add(name)
+        if unit.suffix == "rpm" or (unit.factor, unit.offset) == (1.0, 0.0):
+            return values
+        with np.errstate(over="ignore"):
+            values = values * unit.factor + unit.offset
+        self.declared[name] = unit.factor
+        over = np.isinf(values)
+        self.flag(np.flatnonzero(over), f"{name}: too large a number", "; NaN there")
+        values[over] = np.nan
+        return values
+
+    def _other_mark(self, index: int, label: str, bad: Sequence[int]) -> bool:
+        """Faults of cells with another decimal mark than the table's; whether the column is lost by commas."""
+        split = self.table if isinstance(self.table, SplitTable) else None
+        if self.decimal == "," and split is not None:
+            for i in lone_points(split.cells(index))[:1]:
+                got = f"{split.cell(i, index)!r} among the decimal commas of {label!r}"
+                hint = "Thousands or decimals? Write it with a comma, or without a mark"
+                self.fault(f"{self.line(i)}:{index + 1}", got, "one decimal mark", hint)
+        if self.decimal != ".":
+            return False
         cells = {i: self.table.cell(i, index) for i in bad}
         comma = [i for i in bad if re.fullmatch(r"[+-]?\d+,\d*|[+-]?\d{1,3}(,\d{3})*\.\d*", cells[i])]
         if comma:
             got = f"{cells[comma[0]]!r} ({len(comma)} such cells of {label!r})"
             hint = 'State decimal = "," in a recording.toml in the same folder, or export with decimal points'
-            hint += f"; {odd}" if isinstance(self.table, SplitTable) and (odd := odd_mark(self.table)) else ""
+            hint += f"; {odd}" if split is not None and (odd := odd_mark(split)) else ""
             if all(_THOUSANDS.fullmatch(cells[i]) for i in comma):
                 hint = f"A comma between thousands? Export without. If not: {hint[0].lower()}{hint[1:]}"
             self.fault(f"{self.line(comma[0])}:{index + 1}", got, "a number with a decimal point", hint)
@@ -362,17 +361,16 @@ class Builder:
             note = f"text, kept as such, in {number_of(len(self.words), 'column')}: {some(self.words, 8)}"
             self.warnings.append(Remark(note))
         if self.unitless:
-            hint = "Name units in the headings or in a recording.toml" + _nearest(self.unitless, self.channels)
+            hint = "Name units in the headings or in a recording.toml" + nearest(self.unitless, self.channels)
             self.warnings.append(f"no unit known, none assumed, for {some(self.unitless, 8)}. {hint}")
         said = {**self.table.source.about, "declared": self.declared, "asked": self.asked, **(provenance or {})}
-        asked = _asked(self.unitless, self.channels)
-        if asks := [*self.asks, *asked.values()]:
-            file = Path(self.table.source.name)
-            step = f"bemt import {shlex.quote(file.as_posix())} {' '.join(asks)} --out {kept_beside([file])[0]}"
-            own = [f"your {what} in place of {mark}" for mark, what in _OWN.items() if mark in step]
-            self.warnings.append(f"in one step, with {' and '.join(own)}: {step}" if own else step)
-            if self.asks or _NEEDED & asked.keys():
-                said["step"] = f"{step}   ({' and '.join(own)})" if own else step
+        open_units = asked(self.unitless, self.channels)
+        if asks := [*self.asks, *open_units.values()]:
+            step = one_step(Path(self.table.source.name).as_posix(), asks)
+            own = " and ".join(f"your {what} in place of {mark}" for mark, what in OWN.items() if mark in step)
+            self.warnings.append(f"in one step, with {own}: {step}" if own else step)
+            if self.asks or NEEDED & open_units.keys():
+                said["step"] = f"{step}   ({own})" if own else step
         flags: list[tuple[str, ...]] = [()] * len(self.table) if self.flags else []
         for row, words in self.flags.items():
             flags[row] = tuple(words)
@@ -382,20 +380,6 @@ class Builder:
         )  # fmt: skip
 
 
-def kept_beside(tables: Sequence[Path]) -> list[str]:
-    """Files, as typed, that can keep what is stated of tables: beside each, and of a name that is free."""
-    out = []
-    for table in tables:
-        stems = ("recording", table.stem) if len(tables) == 1 else (table.stem,)
-        places = [table.with_name(f"{stem}.toml") for stem in stems]
-        out.append(next((p for p in places if not p.exists()), table.with_name(f"{table.stem}_stated.toml")))
-    return [shlex.quote(p.as_posix()) for p in out]
-
-
-_OWN = {"UNIT": "units", "PAIRS": "number"}
-"""What a user puts in place of a mark."""
-_NEEDED = {"rpm", "thrust", "torque"}
-"""Quantities of which nothing can be said while their unit is open."""
 _PLAUSIBLE: dict[str, tuple[float, float, str]] = {
     "rpm": (150.0, 3e5, "rev/s, rad/s or electrical revolutions?"),
     "pulse_width_s": (5e-4, 3e-3, "Microseconds against milliseconds?"),
@@ -421,59 +405,3 @@ def slip(ratio: float) -> str:
             if abs(abs(ratio) / value - 1.0) < SLIP:
                 return f" (the factor of {name})"
     return " (the sign differs)" if abs(ratio + 1.0) < SLIP else ""
-
-
-_MEANINGS = ("rpm", "thrust", "torque", "voltage", "current", "power", "time", "airspeed", "throttle", "pressure",
-             "temperature", "density", "humidity")  # fmt: skip
-
-
-def _asked(headings: Sequence[str], channels: Iterable[str]) -> dict[str, str]:
-    """Options of ``bemt import``, by quantity, that state the unit of headings whose words are one quantity."""
-    out: dict[str, str] = {}
-    names = [label[1:].rsplit("'", 1)[0].split("' (")[0] for label in headings]
-    channels = {*channels} - {slug(name) for name in names}
-    for name in names:
-        found = {"rpm"} if surely_shaft_speed(name) else set(meanings(name))
-        found -= {"pulse_width"} if "throttle" in found else set()
-        quantity = found.pop() if len(found) == 1 else ""
-        if quantity and not any(k == quantity or k.startswith(f"{quantity}_") for k in channels):
-            out.setdefault(quantity, f"--unit {shlex.quote(name)}=UNIT")
-    return out
-
-
-def _nearest(headings: Sequence[str], channels: Iterable[str] = ()) -> str:
-    r"""What headings without a unit may mean, and the line of a recording.toml that says so; empty: nothing is near.
-
-    A bare ``speed`` is that of the shaft or of the air, whichever the file has not.
-
-    >>> _nearest(["'Trust'", "'x'"])  # doctest: +ELLIPSIS
-    '; nearest meaning: \'Trust\' thrust. The line: [columns] thrust = { column = "Trust", unit = "..." }, unit N, ...'
-    >>> _nearest(["'speed'"], ["airspeed_m_s"])  # doctest: +ELLIPSIS
-    '; nearest meaning: \'speed\' rpm. The line: [columns] rpm = { column = "speed", unit = "..." }, unit rad_s, ...'
-    """
-    near: dict[str, list[str]] = {}
-    for label in headings:
-        name = label.split("'")[1] if "'" in label else label
-        word = re.split(r"[\s_(\[]", name.strip().lower())[0]
-        found = _speeds_meant(name, channels) if may_be_shaft_speed(name) else None
-        if found is None:
-            known = [q for q in meanings(name) if q in _MEANINGS]
-            found = known or difflib.get_close_matches(word, _MEANINGS, 1, 0.75)
-        if found:
-            near[name] = found
-    if not near:
-        return ""
-    name, meant = next(iter(near.items()))
-    lines = [
-        f'{m} = {{ column = "{name}", unit = "..." }}, unit {some(units.suffixes(DIMENSIONS[m]), 5)}' for m in meant
-    ]
-    told = ", ".join(f"{k!r} {' or '.join(v)}" for k, v in near.items())
-    return f"; nearest meaning: {told}. The line: [columns] {', or '.join(lines)}"
-
-
-def _speeds_meant(name: str, channels: Iterable[str]) -> list[str]:
-    """Speeds that a heading may mean, of those that the file has not yet."""
-    known = list(channels)
-    turning = any(re.search(r"(^|_)rpm|rad_s$", k) for k in known)
-    moving = any(k == "J" or k.endswith("_m_s") for k in known)
-    return [*([] if turning else ["rpm"]), *([] if moving or surely_shaft_speed(name) else ["airspeed"])]

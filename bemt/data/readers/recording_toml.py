@@ -17,6 +17,7 @@ from pydantic import create_model
 
 from bemt.base import units
 from bemt.base.errors import Fault, InputError, gathered, refuse
+from bemt.base.tables import some
 from bemt.base.toml import Table, entry, shown, validated
 from bemt.base.toml_text import Collector, load_toml
 from bemt.data.readers import head_text, load_text
@@ -25,7 +26,7 @@ from bemt.data.readers.generic_csv import electrical, heads_of, only_ones
 from bemt.data.readers.headings import Heading, known
 from bemt.data.readers.recording import Builder
 from bemt.data.readers.samples import Channel
-from bemt.data.readers.split import SplitTable, decimal_mark, some, split_table
+from bemt.data.readers.split import SplitTable, decimal_mark, split_table
 from bemt.physics.air import Air
 from bemt.physics.dataset import Dataset, concat
 

@@ -260,26 +260,22 @@ def to_series(references: Iterable[Reference], name: str) -> list[Dataset]:
     groups: dict[tuple[str, str], list[dict[str, Reference]]] = {}
     for ref in references:
         points = groups.setdefault((ref.kind, ref.source), [])
-        for point in points:
-            first = next(iter(point.values()))
-            if ref.channel not in point and first.condition == ref.condition:
-                point[ref.channel] = ref
-                break
-        else:
-            points.append({ref.channel: ref})
-    out = []
-    for (kind, source), points in groups.items():
-        firsts = [next(iter(point.values())) for point in points]
-        channels = dict.fromkeys(channel for point in points for channel in point)
-        values = {c: np.array([p[c].value if c in p else math.nan for p in points]) for c in channels}
-        u = {c: np.array([p[c].u if c in p else math.nan for p in points]) for c in channels}
-        for column in CONDITIONS:
-            condition = np.array([getattr(first, column) for first in firsts])
-            if column not in values and not np.all(np.isnan(condition)):
-                values[column] = condition
-        remarks = dict.fromkeys(ref.remark for point in points for ref in point.values() if ref.remark)
-        file = firsts[0].where.rsplit(":", 1)[0]
-        provenance = {"source": source, "file": file, "sha256": firsts[0].sha256, "remark": "; ".join(remarks)}
-        labels = tuple(first.where for first in firsts)
-        out.append(Dataset(kind, name, values, u, (), provenance, labels))
-    return out
+        fit = (p for p in points if ref.channel not in p and next(iter(p.values())).condition == ref.condition)
+        if (point := next(fit, None)) is None:
+            points.append(point := {})
+        point[ref.channel] = ref
+    return [_series(kind, name, source, points) for (kind, source), points in groups.items()]
+
+
+def _series(kind: str, name: str, source: str, points: list[dict[str, Reference]]) -> Dataset:
+    """Points of one kind and source, each its references by channel, as a series."""
+    firsts = [next(iter(point.values())) for point in points]
+    channels = dict.fromkeys(channel for point in points for channel in point)
+    values = {c: np.array([p[c].value if c in p else math.nan for p in points]) for c in channels}
+    u = {c: np.array([p[c].u if c in p else math.nan for p in points]) for c in channels}
+    stated = {c: np.array([getattr(first, c) for first in firsts]) for c in CONDITIONS if c not in values}
+    values |= {c: v for c, v in stated.items() if not np.all(np.isnan(v))}
+    remarks = dict.fromkeys(ref.remark for point in points for ref in point.values() if ref.remark)
+    file = firsts[0].where.rsplit(":", 1)[0]
+    provenance = {"source": source, "file": file, "sha256": firsts[0].sha256, "remark": "; ".join(remarks)}
+    return Dataset(kind, name, values, u, (), provenance, tuple(first.where for first in firsts))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,10 +18,11 @@ import numpy as np
 from bemt.base import units
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, refuse
+from bemt.base.tables import some
 from bemt.data.readers import Reader, SourceText, head_text, load_text, number
 from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.headings import channel_of, heading
-from bemt.data.readers.split import decimal_mark, some, split_table
+from bemt.data.readers.split import decimal_mark, split_table
 
 LOADS = {"thrust": "force", "torque": "torque"}
 _RADIUS = re.compile(r"r|rad|radius|radial[_ ](position|coordinate|distance)|position\[r\]", re.IGNORECASE)
@@ -118,6 +119,25 @@ def read(path: str | os.PathLike[str]) -> dict[str, Slices]:
     table = split_table(_as_table(load_text(path)))
     comma = decimal_mark(table) == ","
     heads = [h.strip() for h in table.headings]
+    loads, over_R = _load_columns(name, heads)
+    wanted = loads | _state_columns(heads)
+    label = next((k for k, h in enumerate(heads) if h.lower() in ("run", "case", "name", "design point")), None)
+    faults: list[Fault] = []
+    runs: dict[str, list[list[float]]] = {}
+    for line, cells in zip(table.lines, table.rows, strict=True):
+        row = []
+        for k, factor in wanted.values():
+            text = cells[k].strip()
+            if (value := number(text.replace(",", ".") if comma else text)) is None:
+                faults.append(Fault(name, f"{line}: {heads[k]}", repr(text), "a number"))
+            row.append((value or 0.0) * factor)
+        runs.setdefault("slices" if label is None else cells[label].strip(), []).append(row)
+    refuse(faults)
+    return {run: _slices(name, run, [*wanted], np.array(body).T, over_R) for run, body in runs.items()}
+
+
+def _load_columns(file: str, heads: Sequence[str]) -> tuple[dict[str, tuple[int, float]], bool]:
+    """Column and factor to SI of the radius and of each load, and whether the radius is over that of the tip."""
     faults: list[Fault] = []
     at: dict[str, tuple[int, float]] = {}
     for k, h in enumerate(heads):
@@ -125,34 +145,25 @@ def read(path: str | os.PathLike[str]) -> dict[str, Slices]:
         if isinstance(meant, tuple):
             at.setdefault(meant[0], (k, meant[1]))
         elif meant:
-            faults.append(Fault(name, h, meant, "a unit", f"As in {_EXAMPLE}"))
-    if over := "r" not in at and "r/R" in at:
-        at["r"] = at["r/R"]
-    at.pop("r/R", None)
-    if not faults and (missing := [q for q in ("r", *LOADS) if q not in at]):
-        words = {"r": "radius", "thrust": "thrust_per_radius_N_m", "torque": "torque_per_radius_Nm_m"}
-        got = f"columns {some(heads, 8)}: no {', '.join(words[q] for q in missing)}"
-        faults.append(Fault(name, "", got, _EXAMPLE))
+            faults.append(Fault(file, h, meant, "a unit", f"As in {_EXAMPLE}"))
+    share = at.pop("r/R", None)
+    over_R = share is not None and "r" not in at
+    at |= {"r": share} if share is not None and over_R else {}
+    words = {"r": "radius", "thrust": "thrust_per_radius_N_m", "torque": "torque_per_radius_Nm_m"}
+    if not faults and (missing := [text for q, text in words.items() if q not in at]):
+        faults = [Fault(file, "", f"columns {some(heads, 8)}: no {', '.join(missing)}", _EXAMPLE)]
     refuse(faults)
+    return at, over_R
+
+
+def _state_columns(heads: Sequence[str]) -> dict[str, tuple[int, float]]:
+    """Column and factor to SI, rev/min for a speed, of what is stated beside the slices."""
     state: dict[str, tuple[int, float]] = {}
     for k, h in enumerate(heads):
         quantity, unit = channel_of(h), heading(h).unit
         if quantity in ("rpm", "airspeed_m_s", "density_kg_m3") and unit is not None:
             state.setdefault(quantity, (k, 1.0 if unit.suffix == "rpm" else unit.factor))
-    label = next((k for k, h in enumerate(heads) if h.lower() in ("run", "case", "name", "design point")), None)
-    rows: dict[str, list[list[float]]] = {}
-    wanted = {**at, **state}
-    for line, cells in zip(table.lines, table.rows, strict=True):
-        texts = [cells[k].strip() if k < len(cells) else "" for k, _ in wanted.values()]
-        values = [number(t.replace(",", ".") if comma else t) for t in texts]
-        faults += [Fault(name, f"{line}: {heads[k]}", repr(t), "a number")
-                   for (k, _), t, v in zip(wanted.values(), texts, values, strict=True) if v is None]  # fmt: skip
-        run = "slices" if label is None else cells[label].strip()
-        rows.setdefault(run, []).append([(v or 0.0) * f for v, (_, f) in zip(values, wanted.values(), strict=True)])
-    if not rows:
-        faults.append(Fault(name, "", "no rows", "one slice a row"))
-    refuse(faults)
-    return {run: _slices(name, run, [*wanted], np.array(body).T, over) for run, body in rows.items()}
+    return state
 
 
 def _as_table(source: SourceText) -> SourceText:

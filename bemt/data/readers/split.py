@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bemt.base import units
 from bemt.base.errors import Fault
-from bemt.base.tables import number_of
+from bemt.base.tables import number_of, some
 from bemt.data.readers import SourceText, number
 from bemt.data.readers._words import english, quantities
 from bemt.data.readers.unit_text import unit_of
@@ -90,13 +90,10 @@ def column_numbers(cells: Sequence[str], decimal: str = ".") -> tuple[NDArray[np
     bad: list[int] = []
     empty = 0
     for i, cell in enumerate(cells):
-        if decimal == ",":
-            value = _ungrouped(cell, ",") if "." in cell else None
-            value = number(cell.replace(",", ".") if "." not in cell else cell) if value is None else value
-        else:
-            value = number(cell)
-        if value is None and cell:
-            value = _ungrouped(cell, decimal)
+        commas, point = decimal == ",", "." in cell
+        value = _ungrouped(cell, ",") if commas and point else None
+        value = number(cell.replace(",", ".") if commas and not point else cell) if value is None else value
+        value = _ungrouped(cell, decimal) if value is None and cell else value
         if value is not None:
             values[i] = value
         elif cell.lower() in NO_VALUE:
@@ -160,17 +157,6 @@ def is_comment(line: str) -> bool:
     (True, False)
     """
     return bool(_COMMENT.match(line))
-
-
-def some(items: Iterable[object], limit: int = 5) -> str:
-    """First few of many, in words.
-
-    >>> some([1, 2]), some(range(9), 3)
-    ('1, 2', '0, 1, 2 and 6 more')
-    """
-    found = list(items)
-    more = f" and {len(found) - limit} more" if len(found) > limit else ""
-    return ", ".join(map(str, found[:limit])) + more
 
 
 def find_delimiter(lines: Sequence[str]) -> str:
@@ -330,14 +316,13 @@ def _without_ends(
     few = max(1, len(names) // 3)
     while len(kept) > 1 and not any(map(_reads, kept[-1][1])) and sum(map(bool, kept[-1][1])) <= few:
         ends.append(kept.pop())
-    if again:
-        notes.append(f"{number_of(len(again), 'line')} left out: the headings again (line {some(again)})")
-    if sums:
-        words = some((f"{word!r} in line {i}" for i, word in sums), 3)
-        notes.append(f"{number_of(len(sums), 'line')} left out: sums of others ({words})")
-    if ends:
-        words = some((f"{' '.join(filter(None, c))[:60]!r} in line {i}" for i, c in ends[::-1]), 3)
-        notes.append(f"{number_of(len(ends), 'line')} left out: remarks at the end ({words})")
+    named = some((f"{word!r} in line {i}" for i, word in sums), 3)
+    last = some((f"{' '.join(filter(None, c))[:60]!r} in line {i}" for i, c in ends[::-1]), 3)
+    told: tuple[tuple[Sequence[object], str], ...] = (
+        (again, f"the headings again (line {some(again)})"), (sums, f"sums of others ({named})"),
+        (ends, f"remarks at the end ({last})"),
+    )  # fmt: skip
+    notes += [f"{number_of(len(found), 'line')} left out: {what}" for found, what in told if found]
     return kept
 
 
@@ -364,11 +349,11 @@ def split_table(
     used, notes = _used_lines(source, lines)
     start, mark = find_start([t for _, t in used[:60]]) if delimiter is None and header is not False else (0, delimiter)
     mark = mark or find_delimiter([t for _, t in used[:5]])
-    labview = next((split_line(t, mark) for _, t in used[:start] if t.startswith("Y_Unit_Label")), [])
-    if start and not _EXCEL.fullmatch(used[0][1]):
-        above = some((repr(t.strip()[:60]) for _, t in used[:start]), 3)
-        notes.append(f"{number_of(start, 'line')} above the headings left out: {above}")
-    above_headings, used = tuple(used[:start]), used[start:]
+    above, used = tuple(used[:start]), used[start:]
+    labview = next((split_line(t, mark) for _, t in above if t.startswith("Y_Unit_Label")), [])
+    if above and not _EXCEL.fullmatch(above[0][1]):
+        shown = some((repr(t.strip()[:60]) for _, t in above), 3)
+        notes.append(f"{number_of(start, 'line')} above the headings left out: {shown}")
     split = [(i, split_line(t, mark)) for i, t in used]
     if header is None and (said := _in_a_comment(lines, split, mark)):
         split.insert(0, said)
@@ -376,8 +361,7 @@ def split_table(
         notes[:1] = [f"{comments} comment lines left out"] if comments else []
         notes.append(f"the headings are the comment in line {said[0]}")
     top, first = split[0]
-    if header is None:
-        header = not any(number(c) is not None for c in first)
+    header = not any(number(c) is not None for c in first) if header is None else header
     if header and len(split) > 1 and top == used[0][0]:
         first = heading_cells(used[0][1], mark, len(split[1][1]))
     first = _of_labview(first, labview)
@@ -385,8 +369,8 @@ def split_table(
     names, body = _below(first, split, closed, notes) if header else ([], split)
     width = len(names) or max((len(c) for _, c in split[:2]), default=len(first))
     rows, cut, misfits = _rows(source, body, width, top, closed, most_misfits)
-    return SplitTable(source, mark, tuple(names), rows, tuple(i for i, _ in body), tuple(notes), cut, top, misfits,
-                      above_headings)  # fmt: skip
+    numbers = tuple(i for i, _ in body)
+    return SplitTable(source, mark, tuple(names), rows, numbers, tuple(notes), cut, top, misfits, above)
 
 
 def _with_units(names: Sequence[str], units_: Sequence[str]) -> list[str]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bemt.base import units
 from bemt.base.arrays import Array
@@ -135,90 +136,115 @@ def read_stations(path: Path, R: float) -> BladeStations:
     if not source.text.strip():
         source.refuse("", "0 stations", "two or more")
     table = split_table(source, header=True, most_misfits=1.0)
-    top = table.headings_line
+    by_name, told = _by_name(table, R)
+    places = _places(source, table, by_name)
+    decimal = decimal_mark(table)
+    if decimal == "." and (odd := odd_mark(table)):
+        source.refuse("", odd, "one decimal mark")
+    columns = _numbers(source, table, places, decimal)
+    rows = _rootwards(source, table, places[0], columns[0])
+    x, chord, beta = (values[rows] for values in columns)
+    if places[2].name == "pitch":
+        beta = np.degrees(np.arctan2(beta, 2.0 * np.pi * x))
+    _limits(source, places, (x, chord, beta), R)
+    source.check()
+    _mistyped(source, table, rows, places, (x, chord, beta))
+    source.check()
+    thick, left = _thickness(table, by_name["thickness"], decimal, rows, chord)
+    used = {c.at for c in (*places, *by_name["thickness"])}
+    left += [f"column {h!r} not used" for j, h in enumerate(table.headings) if j not in used and h.strip()]
+    return BladeStations(np.minimum(x, 1.0), chord, np.radians(beta), thick, (*told, *left))
+
+
+def _by_name(table: SplitTable, R: float) -> tuple[dict[str, list[_Column]], list[str]]:
+    """Columns by what they stand for; where no other is, the one angle of a table is the blade's, which is told."""
     found = [column for j, text in enumerate(table.headings) if (column := column_of(j, text, R))]
+    angles = [(j, h) for j, h in enumerate(table.headings) if _ANGLE.search(plain(h))]
     told = []
-    bare = [(j, h) for j, h in enumerate(table.headings) if _ANGLE.search(plain(h))]
-    if len(bare) == 1 and not {"beta", "pitch"} & {column.name for column in found}:  # the one angle is the blade's
-        angles = [c for j, h in bare if (c := column_of(j, _ANGLE.sub("blade angle", plain(h)), R))]
-        told = [f"column {bare[0][1]!r} read as beta_deg, the angle to the plane of rotation" for _ in angles]
-        found += angles
-    by_name = {name: [c for c in found if c.name == name] for name in _HEADS}
+    if len(angles) == 1 and not {"beta", "pitch"} & {column.name for column in found}:
+        (j, h), *_ = angles
+        if column := column_of(j, _ANGLE.sub("blade angle", plain(h)), R):
+            found.append(column)
+            told = [f"column {h!r} read as beta_deg, the angle to the plane of rotation"]
+    return {name: [c for c in found if c.name == name] for name in _HEADS}, told
+
+
+def _places(source: SourceText, table: SplitTable, by_name: Mapping[str, list[_Column]]) -> list[_Column]:
+    """Columns of radius, chord, and angle or pitch; refused where one lacks, faults where one is there twice."""
+    top = table.headings_line
     wanted = ("r", "chord", "beta" if by_name["beta"] or not by_name["pitch"] else "pitch")
     if lacking := [name for name in wanted if not by_name[name]]:
-        header = source.lines[top - 1].strip()
-        got = f"the header {header!r} without {' and '.join(lacking)}"
+        got = f"the header {source.lines[top - 1].strip()!r} without {' and '.join(lacking)}"
         source.refuse(top, got, EXPECTED, _hint(table.headings, lacking))
     for name in wanted:
         if len(by_name[name]) > 1:
             source.add(top, " and ".join(c.heading for c in by_name[name]), "one of them")
+    return [by_name[name][0] for name in wanted]
+
+
+def _numbers(source: SourceText, table: SplitTable, places: Sequence[_Column], decimal: str) -> list[Array]:
+    """Values of the columns as shares of the tip radius, or degrees, (N,) each; all faults of the cells at once."""
     for i in table.misfits:
-        source.add(table.lines[i], "another number of cells", f"{table.width}, as in line {top}")
-    places = [by_name[name][0] for name in wanted]
-    decimal = decimal_mark(table)
-    if decimal == "." and (odd := odd_mark(table)):
-        source.refuse("", odd, "one decimal mark")
-    thicknesses = by_name["thickness"]
-    thick, left = _thickness(table, thicknesses, decimal)
-    columns = []
-    for place in places:
-        values = table.numbers(place.at, decimal)[0]
+        source.add(table.lines[i], "another number of cells", f"{table.width}, as in line {table.headings_line}")
+    columns = [table.numbers(place.at, decimal)[0] for place in places]
+    for place, values in zip(places, columns, strict=True):
         for i in np.flatnonzero(np.isnan(values)).tolist():
             if i not in table.misfits:
                 source.add(f"{table.lines[i]}:{place.at + 1}", repr(table.cell(i, place.at)), "a number")
-        columns.append(values * place.scale)
     source.faults.sort(key=lambda fault: int(fault.where.split(":")[0]))
     if not source.faults and len(table) < 2:
         source.add("", number_of(len(table), "station"), "two or more")
     source.check()
-    inwards = bool(np.all(np.diff(columns[0]) < 0.0))
-    if inwards:  # from the tip
-        columns = [v[::-1] for v in columns]
-        thick = None if thick is None else thick[::-1]
-    elif back := np.flatnonzero(np.diff(columns[0]) <= 0.0).tolist():
-        got = " after ".join(table.cell(i, places[0].at) for i in (back[0] + 1, back[0]))
-        source.add(f"{table.lines[back[0] + 1]}:{places[0].at + 1}", got, "radii that ascend from line to line")
-        source.check()
-    x, chord, beta = columns
-    if wanted[2] == "pitch":
-        beta = np.degrees(np.arctan2(beta, 2.0 * np.pi * x))
-    _limits(source, places, (x, chord, beta), R)
+    return [values * place.scale for place, values in zip(places, columns, strict=True)]
+
+
+def _rootwards(source: SourceText, table: SplitTable, place: _Column, r: Array) -> NDArray[np.intp]:
+    """Rows of the table from root to tip, (N,); it may begin at either end."""
+    rows = np.arange(len(r))
+    if np.all(np.diff(r) < 0.0):
+        return rows[::-1]
+    for i in np.flatnonzero(np.diff(r) <= 0.0)[:1].tolist():
+        got = f"{table.cell(i + 1, place.at)} after {table.cell(i, place.at)}"
+        source.add(f"{table.lines[i + 1]}:{place.at + 1}", got, "radii that ascend from line to line")
     source.check()
+    return rows
+
+
+def _mistyped(
+    source: SourceText, table: SplitTable, rows: NDArray[np.intp], places: Sequence[_Column],
+    columns: tuple[Array, Array, Array],
+) -> None:  # fmt: skip
+    """Faults of a chord and of an angle that lie far off the line between their neighbours."""
+    x, chord, beta = columns
     pitch = _between(x, x * np.tan(np.radians(beta)))  # a screw's is the same everywhere
     width, angle = _between(x, chord), np.degrees(np.arctan2(pitch, x[1:-1]))
-    for place, line, off, far in (
+    for place, usual, off, far in (
         (places[1], width, np.abs(np.log(chord[1:-1] / width)), np.log(LONE_TIMES)),
-        (places[2], angle, np.abs(beta[1:-1] - angle), LONE_DEG),
+        (places[2], 2.0 * np.pi * pitch if places[2].name == "pitch" else angle, np.abs(beta[1:-1] - angle), LONE_DEG),
     ):
         if off.size and off.max() > far:
             k = int(np.argmax(off))
-            row = len(table) - 2 - k if inwards else k + 1
-            usual = 2.0 * np.pi * pitch[k] if place.name == "pitch" else line[k]
-            expected = f"about {usual / place.scale:.3g}, as its neighbours have it"
+            row = int(rows[k + 1])
+            expected = f"about {usual[k] / place.scale:.3g}, as its neighbours have it"
             source.add(f"{table.lines[row]}:{place.at + 1}", table.cell(row, place.at), expected, "Mistyped?")
-    source.check()
-    if thick is not None and not thicknesses[0].share:
-        thick = thick / chord
-    if thick is not None and not (THICKNESSES[0] <= thick.min() and thick.max() <= THICKNESSES[1]):
-        heading, reach = thicknesses[0].heading, f"{thick.min():.3g} to {thick.max():.3g} of the chord"
-        why = f"{reach}; a section has 0.01 to 0.5. Per cent is t/c %, a length t_mm"
-        left = [*left, f"column {heading!r} not used: {why}"]
-        thick = None
-    used = {p.at for p in places} | {c.at for c in thicknesses}
-    left = [*told, *left]
-    left += [f"column {h!r} not used" for j, h in enumerate(table.headings) if j not in used and h.strip()]
-    return BladeStations(np.minimum(x, 1.0), chord, np.radians(beta), thick, tuple(left))
 
 
-def _thickness(table: SplitTable, columns: Sequence[_Column], decimal: str) -> tuple[Array | None, list[str]]:
-    """Thickness of the chord or of R, if one column says it for every station; else why not."""
+def _thickness(
+    table: SplitTable, columns: Sequence[_Column], decimal: str, rows: NDArray[np.intp], chord: Array
+) -> tuple[Array | None, list[str]]:
+    """Thickness over chord, (N,), if one column says it for every station; else why not."""
     if not columns:
         return None, []
-    values = table.numbers(columns[0].at, decimal)[0] * columns[0].scale
-    if len(columns) == 1 and np.all(np.isfinite(values)):
-        return values, []
-    why = "two of thickness" if len(columns) > 1 else "not a number at every station"
-    return None, [f"column {c.heading!r} not used: {why}" for c in columns]
+    column = columns[0]
+    thick = table.numbers(column.at, decimal)[0][rows] * column.scale
+    if len(columns) > 1 or not np.all(np.isfinite(thick)):
+        why = "two of thickness" if len(columns) > 1 else "not a number at every station"
+        return None, [f"column {c.heading!r} not used: {why}" for c in columns]
+    thick = thick if column.share else thick / chord
+    if THICKNESSES[0] <= thick.min() and thick.max() <= THICKNESSES[1]:
+        return thick, []
+    why = f"{thick.min():.3g} to {thick.max():.3g} of the chord; a section has 0.01 to 0.5"
+    return None, [f"column {column.heading!r} not used: {why}. Per cent is t/c %, a length t_mm"]
 
 
 def _between(x: Array, values: Array) -> Array:

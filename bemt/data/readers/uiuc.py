@@ -34,7 +34,7 @@ import os
 import re
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -335,60 +335,55 @@ def _choose_geometry(name: UiucName, own: Mapping[str, tuple[UiucName, UiucGeome
     return replace(geometry, beta_deg=geometry.beta_deg + turn, origin=origin, rotation_deg=turn)
 
 
-@dataclass
-class _Parts:
-    """Tables of a propeller by the role of their file, and the roles whose file was refused."""
-
-    geom: list[Any] = field(default_factory=list)
-    thick: list[Any] = field(default_factory=list)
-    static: list[Any] = field(default_factory=list)
-    line: list[Any] = field(default_factory=list)
-    refused: list[str] = field(default_factory=list)
+_Tables = dict[str, dict[str, list[Any]]]
+"""Tables of each propeller by the role of their file, and under ``refused`` the roles whose file was refused."""
 
 
-def _collect(files: list[tuple[Path, UiucFile]], faults: list[Fault]) -> Iterator[UiucPropeller]:
-    """Read the files of one folder and join them to propellers; faults are appended."""
-    parts: dict[str, _Parts] = defaultdict(_Parts)
-    names: dict[str, UiucName] = {}
-    counts: dict[str, int] = defaultdict(int)
+def _tables(files: list[tuple[Path, UiucFile]], faults: list[Fault]) -> _Tables:
+    """Read the files of one folder whose names are in order; faults are appended."""
+    parts: _Tables = defaultdict(lambda: defaultdict(list))
     for file, told in files:
-        name = told.propeller
-        names[name.name] = name
-        counts[name.name] += 1
-        if name.faults:
+        if told.propeller.faults:
             continue
-        own_part = parts[name.name]
+        own = parts[told.propeller.name]
         try:
             table = _READERS[told.role](file)
         except InputError as error:
             faults.extend(error.faults)
-            own_part.refused.append(told.role)
+            own["refused"].append(told.role)
             continue
-        tables: list[Any] = getattr(own_part, told.role)
-        if told.role in ("geom", "thick") and tables:
-            got = f"a second {told.role} table for {name.name}"
-            faults.append(Fault(os.fspath(file), "", got, "one", f"{tables[0].file} is used"))
-            continue
-        tables.append(table)
-    own = {key: (names[key], found.geom[0]) for key, found in parts.items() if found.geom}
+        if told.role in ("geom", "thick") and (first := own[told.role]):
+            got = f"a second {told.role} table for {told.propeller.name}"
+            faults.append(Fault(os.fspath(file), "", got, "one", f"{first[0].file} is used"))
+        else:
+            own[told.role].append(table)
+    return parts
+
+
+def _collect(files: list[tuple[Path, UiucFile]], faults: list[Fault]) -> Iterator[UiucPropeller]:
+    """Join the files of one folder to propellers; faults are appended."""
+    parts = _tables(files, faults)
+    names = {told.propeller.name: told.propeller for _, told in files}
+    own = {key: (names[key], found["geom"][0]) for key, found in parts.items() if found["geom"]}
     for key, name in sorted(names.items()):
-        folder = os.fspath(next(file for file, told in files if told.propeller.name == key).parent)
+        its = [file for file, told in files if told.propeller.name == key]
+        folder = os.fspath(its[0].parent)
         if name.faults:
-            where = f"{folder}/{key}_* ({number_of(counts[key], 'file')})"
+            where = f"{folder}/{key}_* ({number_of(len(its), 'file')})"
             faults += [Fault(where, "name", *fault) for fault in name.faults]
             continue
         if key == name.family or name.diameter_in is None:  # the design of a family is no propeller of its own
             continue
         found = parts[key]
-        if not (found.geom or found.static or found.line):
+        if not (found["geom"] or found["static"] or found["line"]):
             continue
-        thickness = found.thick or (parts[name.family].thick if name.family in parts else [])
+        thickness = found["thick"] or (parts[name.family]["thick"] if name.family in parts else [])
         yield UiucPropeller(
             **vars(name), folder=folder,
             # a refused geometry is not quietly replaced by another
-            geometry=None if "geom" in found.refused else _choose_geometry(name, own),
-            thickness=thickness[0] if thickness else None, statics=tuple(found.static),
-            lines=tuple(sorted(found.line, key=lambda line: (line.rpm, line.file))),
+            geometry=None if "geom" in found["refused"] else _choose_geometry(name, own),
+            thickness=thickness[0] if thickness else None, statics=tuple(found["static"]),
+            lines=tuple(sorted(found["line"], key=lambda line: (line.rpm, line.file))),
         )  # fmt: skip
 
 

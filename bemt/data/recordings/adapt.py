@@ -147,11 +147,8 @@ def _along(found: Mapping[str, Slices], form: str, name: str) -> Dataset:
     command = f"`bemt diagnose RECORDING --case CASE --along {name}`"
     notes.append(f"taken for loads of all blades; {command} sets them beside BEMT")
     over = any(s.over_R for s in found.values())
-    columns = {
-        "r_over_R" if over else "r_m": "r",
-        "thrust_per_radius_N_m": "thrust",
-        "torque_per_radius_Nm_m": "torque",
-    }
+    columns = {"r_over_R" if over else "r_m": "r", "thrust_per_radius_N_m": "thrust",
+               "torque_per_radius_Nm_m": "torque"}  # fmt: skip
     channels = {k: Channel(np.concatenate([getattr(s, a) for s in found.values()]), k.split("_", 3)[-1] if a != "r"
                            else "-" if over else "m") for k, a in columns.items()}  # fmt: skip
     return dataset(form, "table", channels, notes, {"file": name})

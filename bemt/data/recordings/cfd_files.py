@@ -15,12 +15,12 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.averaging import MIN_ROWS, keep_last, relation, revolution_average, steady_average
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, gathered, refuse
+from bemt.base.tables import some
 from bemt.data import readers
 from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import QUANTITIES
 from bemt.data.readers.headings import CELLS, channel_of, heading, may_be_shaft_speed, meanings
-from bemt.data.readers.split import some
 from bemt.data.recordings.channels import clocks_of
 from bemt.physics.dataset import Dataset
 
@@ -84,21 +84,17 @@ def read_run(paths: Sequence[Path]) -> tuple[list[tuple[str, Dataset]], list[Fau
     read: list[tuple[str, Dataset]] = []
     faults: list[Fault] = []
     for path in paths:
-        try:
+        with gathered(faults):
             found = readers.read(path)
-        except InputError as error:
-            faults += error.faults
-            continue
-        if isinstance(found, Dataset) and found.kind == "cfd":
-            read.append((str(path), found))
-        else:
+            if isinstance(found, Dataset) and found.kind == "cfd":
+                read.append((str(path), found))
+                continue
             got = f"a {found.kind if isinstance(found, Dataset) else type(found).__name__}, no export of CFD"
             faults.append(Fault(str(path), "", got, f"an export of {', '.join(dict.fromkeys(PROGRAMS.values()))}"))
     wrong: list[Fault] = []
     read = _joined(read, wrong)
-    wrong += _other_bases(read)
-    if wrong:
-        raise InputError(faults + wrong)
+    if wrong := [*wrong, *_other_bases(read)]:
+        refuse([*faults, *wrong])
     return read, faults
 
 

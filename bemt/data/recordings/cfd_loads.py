@@ -83,37 +83,39 @@ class OpenRun:
     def named(self, quantity: str) -> list[LoadColumn]:
         """Columns that may be a quantity: by the name that was given, by unit, or by the words of the heading."""
         told = self.fact(quantity).column
-        if told is not None:
-            hits = [c for c in self.columns if told in (c.name, c.stem)]
-            if not hits and self.complete:
-                known = ", ".join(dict.fromkeys(c.name for c in self.columns)) or "none"
-                self.fault(None, f"columns.{quantity}.column", repr(told), f"one of {known}")
-            dimension = QUANTITIES[quantity][0]
-            for c in hits[:1]:
-                unit = unit_of(c.unit)
-                other = c.coefficient[0] or other_dimension(c.stem, dimension)
-                if unit is not None:  # what is stated of its unit is kept, in `si`
-                    other = "" if unit.dimension == dimension or self.fact(quantity).unit else unit.dimension
-                if other and quantity != "cells":
-                    got = f"a column of {other.replace('_', ' ')} for the {quantity}"
-                    hint = f"Leave out its unit: {BY_THE_CASE}" if c.coefficient[0] else ""
-                    if unit is not None:
-                        meant = f"{c.unit}f" if (other, dimension) == ("mass", "force") else QUANTITIES[quantity][1]
-                        hint = f"The file says {c.unit}; if that is wrong: --unit {quantity}={shlex.quote(meant)}"
-                    self.fault(c, c.name, got, f"one of {dimension.replace('_', ' ')}", hint)
-            return hits
-        taken = {getattr(self.run.columns, q).column for q in QUANTITIES if getattr(self.run.columns, q) is not None}
-        free = (c for c in self.columns if not (c.name in taken or c.stem in taken or c.axis))
-        return recorded([c for c in free if fits(c, quantity, self.fact(quantity).unit)])
+        if told is None:
+            taken = {self.fact(q).column for q in QUANTITIES}
+            free = (c for c in self.columns if not (c.name in taken or c.stem in taken or c.axis))
+            return recorded([c for c in free if fits(c, quantity, self.fact(quantity).unit)])
+        hits = [c for c in self.columns if told in (c.name, c.stem)]
+        if hits:
+            self._is_one(quantity, hits[0])
+        elif self.complete:
+            known = ", ".join(dict.fromkeys(c.name for c in self.columns)) or "none"
+            self.fault(None, f"columns.{quantity}.column", repr(told), f"one of {known}")
+        return hits
+
+    def _is_one(self, quantity: str, c: LoadColumn) -> None:
+        """Fault where the column that is stated for a quantity is another by its unit, or a coefficient."""
+        (dimension, usual), unit = QUANTITIES[quantity], unit_of(c.unit)
+        if unit is None:
+            other = c.coefficient[0] or other_dimension(c.stem, dimension)
+            hint = f"Leave out its unit: {BY_THE_CASE}" if c.coefficient[0] else ""
+        else:  # what is stated of its unit is kept, in `si`
+            other = "" if unit.dimension == dimension or self.fact(quantity).unit else unit.dimension
+            meant = f"{c.unit}f" if (other, dimension) == ("mass", "force") else usual
+            hint = f"The file says {c.unit}; if that is wrong: --unit {quantity}={shlex.quote(meant)}"
+        if other and quantity != "cells":
+            got = f"a column of {other.replace('_', ' ')} for the {quantity}"
+            self.fault(c, c.name, got, f"one of {dimension.replace('_', ' ')}", hint)
 
     def si(self, quantity: str, c: LoadColumn) -> Array | None:
         """Values of a column in SI (rev/min for a speed); a missing unit is a fault."""
         self.used.add(c.name)
         if quantity == "cells":
             return c.record[c.name]
-        told = self.fact(quantity).unit
-        unit = unit_of(told) if told else unit_of(c.unit)
-        stated = unit_of(c.unit)
+        told, stated = self.fact(quantity).unit, unit_of(c.unit)
+        unit = unit_of(told) if told else stated
         alike = stated is not None and unit is not None and stated.dimension == unit.dimension
         if told and alike and stated.suffix != unit.suffix:  # type: ignore[union-attr]
             got = f"{told}, where the file says {c.unit}"
@@ -123,16 +125,19 @@ class OpenRun:
             factor = self._reference(c, c.part or VECTOR.get(quantity, ""))
             return None if factor is None else c.record[c.name] * factor
         if unit is None:
-            usual = QUANTITIES[quantity][1]
-            hint = f'--unit {quantity}="{usual}" if that is its unit; '
-            hint += f'run.toml: [columns] {quantity} = {{ unit = "{usual}" }}'
-            got = f"no unit ({c.unit!r} is none that is known)" if c.unit else "no unit"
-            expected = f"the unit of the {quantity}"
-            if not any((f.file, f.got, f.expected) == (c.file, got, expected) for f in self.faults):  # of all zones
-                self.fault(c, c.name, got, expected, hint)
+            self._no_unit(quantity, c)
             return None
         scale = unit.factor / (math.pi / 30.0) if quantity == "rpm" else unit.factor
         return np.asarray(c.record[c.name] * (1.0 if unit.suffix == "rpm" else scale))
+
+    def _no_unit(self, quantity: str, c: LoadColumn) -> None:
+        """Ask for the unit of a column, once for all zones of a file."""
+        usual = QUANTITIES[quantity][1]
+        got = f"no unit ({c.unit!r} is none that is known)" if c.unit else "no unit"
+        expected = f"the unit of the {quantity}"
+        if not any((f.file, f.got, f.expected) == (c.file, got, expected) for f in self.faults):
+            hint = f'--unit {quantity}="{usual}" if that is its unit; '
+            self.fault(c, c.name, got, expected, f'{hint}run.toml: [columns] {quantity} = {{ unit = "{usual}" }}')
 
     def _reference(self, c: LoadColumn, part: str) -> float | None:
         """Newtons, or newton metres, for one of a coefficient; a propeller's own has n D, 2 D^2 and D for reference."""
@@ -157,7 +162,7 @@ class OpenRun:
         airspeed at most (actuator disk), tells which; what is open then is asked for.
         """
         V, rpm = (np.nan_to_num(state.get(k, np.zeros(1))) for k in ("airspeed_m_s", "rpm"))
-        slowest, flies = float(V.min()), float(V.min()) > FLIES
+        slowest = float(V.min())
         at = {q: f.values[V == slowest] if V.size == f.values.size else f.values for q, f in loads.items()}
         size = {q: float(np.nan_to_num(middle(v))) for q, v in at.items()}
         shaft = max((abs(size[q]) * (1.0 if q == "power" else float(np.median(rpm)) * math.pi / 30.0)
@@ -165,26 +170,33 @@ class OpenRun:
         brakes = 0.0 < shaft < slowest * abs(size.get("thrust", 0.0))  # no pull gives more than its shaft
         out: dict[str, float] = {}
         for quantity, value in size.items():
-            told, name, sign = self.fact(quantity).sign, CHANNEL[quantity], -1.0 if value < 0 else 1.0
+            told, name = self.fact(quantity).sign, CHANNEL[quantity]
             if told is not None:
-                sign = float(told)
+                out[quantity] = float(told)
                 if told * value < 0:
                     why = "a rotor that is driven by the flow" if quantity != "thrust" else "thrust backwards"
                     self.notes.append(f"{name} is {told * value:.4g} by the sign that is stated, {told:+d}: {why}")
             elif quantity == "duct_thrust":
-                sign = out.get("thrust", 1.0)
-            elif value < 0 and flies and quantity == "thrust" and brakes:
-                sign, times = 1.0, f"{slowest * abs(value) / shaft:.3g} times the power of the shaft"
+                out[quantity] = out.get("thrust", 1.0)
+            elif value < 0 and slowest > FLIES and quantity == "thrust" and brakes:
+                out[quantity], times = 1.0, f"{slowest * abs(value) / shaft:.3g} times the power of the shaft"
                 self.notes.append(f"{name} is {value:.4g} in the file: kept, since as a pull it would give {times}")
-            elif value < 0 and flies and (brakes or quantity == "thrust" or "thrust" not in loads):
-                got, may = f"{value:.4g} in the file at {slowest:.4g} m/s", "its sign: in flight a rotor may brake"
-                may += "" if quantity == "thrust" else ", and the flow may drive it"
-                self.fault(None, quantity, got, may, f"--sign {quantity}=1 keeps it, --sign {quantity}=-1 turns it")
-            elif value < 0:
-                kept = f"--sign {quantity}=1 keeps it"
-                self.notes.append(f"{name} is {value:.4g} in the file: taken as positive ({kept})")
-            out[quantity] = sign
+            else:
+                out[quantity] = -1.0 if value < 0 else 1.0
+                open_ = slowest > FLIES and (brakes or quantity == "thrust" or "thrust" not in loads)
+                if value < 0:
+                    self._turned(quantity, value, slowest if open_ else None)
         return out
+
+    def _turned(self, quantity: str, value: float, airspeed: float | None) -> None:
+        """Note a load whose sign is turned to positive; ask about it at an airspeed [m/s] that may be why."""
+        keeps = f"--sign {quantity}=1 keeps it"
+        if airspeed is None:
+            self.notes.append(f"{CHANNEL[quantity]} is {value:.4g} in the file: taken as positive ({keeps})")
+            return
+        got, may = f"{value:.4g} in the file at {airspeed:.4g} m/s", "its sign: in flight a rotor may brake"
+        may += "" if quantity == "thrust" else ", and the flow may drive it"
+        self.fault(None, quantity, got, may, f"{keeps}, --sign {quantity}=-1 turns it")
 
     def of_density(self, loads: Mapping[str, Settled], state: Mapping[str, Array]) -> Array:
         """Density of the run over the one that its program took for it; reference values without effect are faults."""
@@ -368,11 +380,15 @@ def _on_shaft(run: OpenRun, pool: Mapping[str, LoadColumn], zones: Sequence[str]
     named = [z for z in moment if TURNS.search(z)]
     whole = sum(moment[z] for z in named or moment)
     against = [z for z in moment if moment[z] * whole < 0.0]
-    if len(moment) == len(zones) and sum(abs(moment[z]) for z in against) <= _SLIGHT * abs(whole):
+
+    def counts(some: Sequence[str]) -> bool:
+        return sum(abs(moment[z]) for z in some) > _SLIGHT * abs(whole)
+
+    if len(moment) == len(zones) and not counts(against):
         return list(moment)
     shaft = named or sorted(moment, key=lambda z: -abs(moment[z]))[:1]
     doubt = [z for z in moment if (z in shaft) == (z in against)] if named else [z for z in moment if z not in shaft]
-    if sum(abs(moment[z]) for z in doubt) > _SLIGHT * abs(whole):
+    if counts(doubt):
         got = "torque of " + ", ".join(f"{z} {m:+.4g}" for z, m in moment.items())
         hint = f"--rotor-zones {','.join(z for z in shaft if z not in doubt)}: those on one shaft; thrust counts all"
         run.fault(None, "zones", got, "the zones that turn with the shaft", hint)
@@ -383,26 +399,32 @@ def counted_zones(
     run: OpenRun, quantity: str, pool: Mapping[str, LoadColumn]
 ) -> tuple[list[tuple[float, str]], list[str]]:
     """Zones whose loads are added (with their sign), and those of them that are the duct."""
-    zones, torque = run.run.run.zones, quantity == "torque"
     ducts = [z for z in pool if run.is_duct(z)]
-    if zones is not None:
-        known = _stated_zones(run, quantity, pool, zones)
-        shaft = _on_shaft(run, pool, known) if torque and len(known) > 1 else known
-        if left := [z for z in known if z not in shaft] if shaft else []:
-            run.notes.append(f"torque is that of {' + '.join(shaft)}, without {', '.join(left)}: the shaft's own")
-        return [(1.0, z) for z in shaft or known], [z for z in known if z in ducts]
+    if run.run.run.zones is not None:
+        known = _stated_zones(run, quantity, pool, run.run.run.zones)
+        return [(1.0, z) for z in _turning(run, quantity, pool, known)], [z for z in known if z in ducts]
     net = next((z for z in pool if z.lower() in NET), None)
     if net is not None:
-        parts = [z for z in pool if z != net] if torque else []
-        turning = _on_shaft(run, pool, parts) if parts else []
-        less = [z for z in parts if z not in turning]
-        if less:
-            run.notes.append(f"torque: {net or 'the whole'} less {', '.join(less)}: the shaft's own; thrust counts all")
-        return [(1.0, net), *((-1.0, z) for z in less)], ducts
+        return [(1.0, net), *((-1.0, z) for z in _less(run, quantity, pool, net))], ducts
     if len(pool) > 1:
-        names = shlex.quote(",".join(pool))
-        hint = f"--zones {names} (leave out what does not count)"
+        hint = f"--zones {shlex.quote(','.join(pool))} (leave out what does not count)"
         run.fault(None, "zones", f"{quantity} of {', '.join(pool)}", "the zones that count", hint)
-    else:
-        ducts = []
-    return [(1.0, z) for z in pool], ducts
+    return [(1.0, z) for z in pool], ducts if len(pool) > 1 else []
+
+
+def _turning(run: OpenRun, quantity: str, pool: Mapping[str, LoadColumn], zones: Sequence[str]) -> Sequence[str]:
+    """Those of the stated zones that count: of a torque the ones on the shaft."""
+    shaft = _on_shaft(run, pool, zones) if quantity == "torque" and len(zones) > 1 else zones
+    if shaft and (left := [z for z in zones if z not in shaft]):
+        run.notes.append(f"torque is that of {' + '.join(shaft)}, without {', '.join(left)}: the shaft's own")
+    return shaft or zones
+
+
+def _less(run: OpenRun, quantity: str, pool: Mapping[str, LoadColumn], net: str) -> list[str]:
+    """Zones to take off the whole: of a torque those that are not on the shaft."""
+    parts = [z for z in pool if z != net] if quantity == "torque" else []
+    turning = _on_shaft(run, pool, parts) if parts else []
+    less = [z for z in parts if z not in turning]
+    if less:
+        run.notes.append(f"torque: {net or 'the whole'} less {', '.join(less)}: the shaft's own; thrust counts all")
+    return less

@@ -10,17 +10,17 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeGuard
+from typing import Any, NoReturn, TypeGuard
 
 import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.averaging import Mean
-from bemt.base.errors import Fault, InputError
-from bemt.base.tables import number_of, number_text, text_table
+from bemt.base.errors import Fault, InputError, gathered, refuse
+from bemt.base.tables import number_of
 from bemt.data import readers
 from bemt.data.readers.cfd import unit_of
-from bemt.data.readers.cfd_run import RunToml
+from bemt.data.readers.cfd_run import GridTable, RunToml
 from bemt.data.readers.headings import channel_of, heading, meanings
 from bemt.data.readers.marks import EXPORT
 from bemt.data.recordings.cfd_files import (
@@ -49,20 +49,14 @@ from bemt.data.recordings.cfd_loads import (
     other_axes,
     same_shaft,
 )
-from bemt.data.recordings.cfd_setup import (
-    THRUSTS,
-    TORQUES,
-    CfdRun,
-    Elsewhere,
-    conditions_text,
-    with_grid_floor,
-)
+from bemt.data.recordings.cfd_setup import THRUSTS, TORQUES, CfdRun, Elsewhere, with_grid_floor
 from bemt.data.recordings.channels import moves
 from bemt.data.recordings.check import check
-from bemt.data.recordings.grid_study import CELL_SIZE, COVERAGE, by_grid, groups, together
+from bemt.data.recordings.grid_study import COVERAGE
+from bemt.data.recordings.grids import CELL_SIZE, by_grid, groups, together
 from bemt.physics.dataset import Dataset
 
-__all__ = ["NO_LOAD", "assemble", "is_run", "run_at", "run_text"]
+__all__ = ["NO_LOAD", "assemble", "is_run", "run_at"]
 
 NO_LOAD = "a thrust or a torque"
 WHICH = "--column airspeed=NAME says what it is, --ignore NAME leaves it out"
@@ -84,23 +78,17 @@ def run_at(path: str, rpm: float | None = None, airspeed_m_s: float | None = Non
     at = Path(path)
     told = {k: v for k, v in (("rpm", rpm), ("airspeed_m_s", airspeed_m_s)) if v is not None}
     made = at / "run.toml" if (at / "run.toml").is_file() else at
-    if made.is_dir():
-        files = cfd_files(made)
-    elif not made.is_file():
-        return None
-    else:
-        kind = readers.kind_of(made)
-        if kind == "cfd_run":
-            run = readers.read(made, kind)
-            twice = [k for k in told if getattr(run.run, k) not in (None, told[k])]
-            if twice:
-                got = ", ".join(f"{k} {told[k]:g}, where the run has {getattr(run.run, k):g}" for k in twice)
-                raise InputError(Fault(path, "run", got, "one operating point", "Leave out the option"))
-            run = run.model_copy(update={"run": run.run.model_copy(update=told)})
-            return assemble(run, made.parent, path)
-        files = (made,) if kind in PROGRAMS else ()
-        other = made.with_name(_BESIDE.get(made.name, made.name))
-        files += (other,) if files and other != made and other.is_file() else ()
+    kind = readers.kind_of(made) if made.is_file() else ""
+    if kind == "cfd_run":
+        run = readers.read(made, kind)
+        if twice := [k for k in told if getattr(run.run, k) not in (None, told[k])]:
+            got = ", ".join(f"{k} {told[k]:g}, where the run has {getattr(run.run, k):g}" for k in twice)
+            raise InputError(Fault(path, "run", got, "one operating point", "Leave out the option"))
+        run = run.model_copy(update={"run": run.run.model_copy(update=told)})
+        return assemble(run, made.parent, path)
+    files = cfd_files(made) if made.is_dir() else (made,) if kind in PROGRAMS else ()
+    other = made.with_name(_BESIDE[made.name]) if made.name in _BESIDE else made
+    files += (other,) if kind in PROGRAMS and other != made and other.is_file() else ()
     if not files:
         return None
     return assemble(RunToml.model_validate({"run": {"files": tuple(map(str, files)), **told}}), Path(), path)
@@ -132,7 +120,7 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> CfdRun:
     """Points of a run: rpm, thrust, torque, the duct's part, with u, and how each was averaged.
 
     One point, or one for each design point, from files relative to `folder`; runs of one condition on several grids
-    (``[[grids]]``, or rows of unlike cells) are one point, with `studies` (`grid_study.by_grid`). InputError with
+    (``[[grids]]``, or rows of unlike cells) are one point, with `studies` (`grids.by_grid`). InputError with
     everything that has to be said first: units, zones, speed.
     """
     if run.grids:
@@ -140,7 +128,6 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> CfdRun:
     work, read = _opened(run, folder, name)
     if not work.complete:
         _ask_all(work)
-        raise InputError(work.told)
     rpm = work.speed()
     work.period = 60.0 / float(rpm[0]) if rpm.size == 1 and np.isfinite(rpm[0]) else math.nan
     times = [c[1][-1] for _, r in read if r.clock == "time" and (c := clock_of(r))[1].size]
@@ -148,7 +135,6 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> CfdRun:
     if times and not math.isfinite(work.period):
         work.period = 1.0
         _ask_all(work)
-        raise InputError(work.told)
     loads = {name: load for q in ("thrust", "torque", "power") for name, load in _summed(work, q).items()}
     same_shaft(work)
     for column in work.named("duct_thrust")[:1] if run.columns.duct_thrust is not None else []:
@@ -165,13 +151,11 @@ def _opened(run: RunToml, folder: Path, name: str) -> tuple[OpenRun, list[tuple[
     files = [folder / f for f in run.run.files]
     walls = y_plus(files)
     read, faults = read_run([f for f in files if f.name != WALLS or not walls])
-    vectors = [(f, r) for f, r in read if any(n.startswith("force_") for n in r.values)]
-    homes = {zone_of(Path(f), r.format) for f, r in vectors}
+    homes = {zone_of(Path(f), r.format) for f, r in read if any(n.startswith("force_") for n in r.values)}
     columns = [c for file, record in read for c in columns_of(file, record, len(homes) > 1)]
     ignore, known = run.run.ignore or (), dict.fromkeys(n for c in columns for n in (c.name, c.stem))
-    if not faults:
-        faults = [Fault(name, "ignore", repr(n), f"one of {', '.join(known)}") for n in ignore if n not in known]
-    columns = [c for c in columns if c.name not in ignore and c.stem not in ignore]
+    faults = faults or [Fault(name, "ignore", repr(n), f"one of {', '.join(known)}") for n in ignore if n not in known]
+    columns = [c for c in columns if not {c.name, c.stem} & {*ignore}]
     told = {"restart": False, "joined": False, "left out": False, "rhoInf": bool(run.reference.density_kg_m3),
             "--sector": bool(run.run.sector)}  # fmt: skip
     notes = [n for _, r in read for n in r.notes if any(word in n and not said for word, said in told.items())]
@@ -225,28 +209,25 @@ def _beside(
 
 def _grids(run: RunToml, folder: Path, name: str) -> CfdRun:
     """Runs on several grids, the options the same for all of them, as one study."""
-    parts: list[CfdRun] = []
-    faults: list[Fault] = []
+    parts, faults = list[CfdRun](), list[Fault]()
     for grid in run.grids:
-        at = [folder / f for f in grid.files]
-        made = at[0] / "run.toml" if (at[0] / "run.toml").is_file() else at[0]
-        try:
-            part = run_of(made) if len(at) == 1 and made.is_file() else None
-            if part is None:
-                files = tuple(str(f) for path in at for f in (cfd_files(path) if path.is_dir() else (path,)))
-                own = run.run.model_copy(update={"files": files})
-                setup = run.setup.model_copy(update={"cells": None})
-                part = assemble(run.model_copy(update={"run": own, "grids": (), "setup": setup}), Path(), str(at[0]))
-        except InputError as error:
-            faults += error.faults
-            continue
-        if grid.cells is not None:
-            part = replace(part, conditions={**part.conditions, "cells": grid.cells})
-        parts.append(part)
-    if faults:
-        raise InputError(list(dict.fromkeys(faults)))
-    found = together(parts, name=name)
-    return replace(found, files=run.files)
+        with gathered(faults):
+            parts.append(_one_grid(run, folder, grid))
+    refuse(dict.fromkeys(faults))
+    return replace(together(parts, name=name), files=run.files)
+
+
+def _one_grid(run: RunToml, folder: Path, grid: GridTable) -> CfdRun:
+    """Run on one grid of several, with the cells that are stated."""
+    at = [folder / f for f in grid.files]
+    made = at[0] / "run.toml" if (at[0] / "run.toml").is_file() else at[0]
+    part = run_of(made) if len(at) == 1 and made.is_file() else None
+    if part is None:
+        files = tuple(str(f) for path in at for f in (cfd_files(path) if path.is_dir() else (path,)))
+        own = run.run.model_copy(update={"files": files})
+        setup = run.setup.model_copy(update={"cells": None})
+        part = assemble(run.model_copy(update={"run": own, "grids": (), "setup": setup}), Path(), str(at[0]))
+    return part if grid.cells is None else replace(part, conditions={**part.conditions, "cells": grid.cells})
 
 
 def _nothing(work: OpenRun) -> None:
@@ -264,14 +245,15 @@ def _nothing(work: OpenRun) -> None:
     work.fault(None, "", f"columns {known}", NO_LOAD, hint)
 
 
-def _ask_all(work: OpenRun) -> None:
-    """Say with a missing speed which units, zones and reference values are missing too."""
+def _ask_all(work: OpenRun) -> NoReturn:
+    """Refuse a run; a missing speed with the units, zones and reference values that are missing too."""
     pools = {quantity: pool for quantity in ("thrust", "torque", "power") if (pool := by_zone(work, quantity))}
     for quantity, pool in pools.items():
         counted_zones(work, quantity, pool)
         work.si(quantity, next(iter(pool.values())))
     if not pools:
         _nothing(work)
+    raise InputError(work.told)
 
 
 @dataclass(frozen=True, eq=False)
@@ -295,11 +277,8 @@ def _operating(work: OpenRun, rpm: Array) -> dict[str, Array]:
         values["cell_size"] = (sized[0].record[sized[0].name] * (1.0 if unit is None else unit.factor)) ** -3.0
         work.size_unit = "m" if unit is not None and unit.dimension == "length" else ""
         work.used.add(sized[0].name)
-    for name, quantity, given in (
-        ("airspeed_m_s", "airspeed", head.airspeed_m_s),
-        ("density_kg_m3", "density", head.density_kg_m3),
-    ):
-        own = work.named(quantity)
+    for name, quantity in (("airspeed_m_s", "airspeed"), ("density_kg_m3", "density")):
+        own, given = work.named(quantity), getattr(head, name)
         if given is not None:
             values[name] = np.array([given])
             rows = bool(own) and own[0].record.clock not in ("time", "iteration")
@@ -352,8 +331,8 @@ def _table(record: Dataset) -> bool:
 
 
 def _unused(work: OpenRun, values: Mapping[str, Array]) -> None:
-    """Name columns that vary and became nothing: rows that differ in one of them only are no repeats."""
-    for quantity in ("thrust", "torque"):  # a column that no word but the user's made a load
+    """Name columns that became nothing, and those that no word but the user's made a load."""
+    for quantity in ("thrust", "torque"):
         told = work.fact(quantity).column
         if told is not None and quantity not in meanings(told):
             work.notes.append(f"{quantity} is {told}, as stated")
@@ -362,14 +341,16 @@ def _unused(work: OpenRun, values: Mapping[str, Array]) -> None:
     if left:
         work.notes.insert(0, f"not used: {', '.join(dict.fromkeys(left))}; --column says what it is")
     rest = [c for c in work.columns if _table(c.record) and c.name not in work.used and moves(c.record[c.name])]
-    rest = [c for c in rest if channel_of(c.stem) not in _KNOWN]
-    if not rest:
-        return
-    names = ", ".join(dict.fromkeys(c.name for c in rest))
-    state = {k: v for k, v in values.items() if k not in CHANNEL.values() and v.size == len(rest[0].record)}
+    if rest := [c for c in rest if channel_of(c.stem) not in _KNOWN]:
+        _unread_rows(work, values, ", ".join(dict.fromkeys(c.name for c in rest)), len(rest[0].record))
+
+
+def _unread_rows(work: OpenRun, values: Mapping[str, Array], names: str, rows: int) -> None:
+    """Name columns that vary and became nothing: rows that differ in one of them only are no repeats."""
+    state = {k: v for k, v in values.items() if k not in CHANNEL.values() and v.size == rows}
     stated = state and not _GRIDS & state.keys()
     apart = any(len(g) > 1 for g in groups(Dataset("cfd", "", state))) if stated else not state
-    end = f": {len(rest[0].record)} rows, of which some differ in nothing else, are no repeats" if apart else ""
+    end = f": {rows} rows, of which some differ in nothing else, are no repeats" if apart else ""
     work.unread = names if apart else ""
     work.notes.insert(0, f"not used, though the rows differ in it: {names}{end}; {WHICH}")
 
@@ -413,22 +394,22 @@ def _stated_grid(work: OpenRun) -> dict[str, float]:
 
 
 def _dataset(work: OpenRun, points: _Points, read: Sequence[tuple[str, Dataset]]) -> CfdRun:
+    """Points of a run as a dataset: rows without a load left out, those of several grids as one study."""
     name, values, averaged, drift = work.name, points.values, points.averaged, points.drift
     sizes = {k: v.size for k, v in values.items()}
     rows = max(sizes.values())
     if {*sizes.values()} - {1, rows}:
         got = ", ".join(f"{k} {size}" for k, size in sizes.items())
         raise InputError(Fault(name, "", f"columns of unlike length ({got})", "files of one run"))
-    full = {k: np.broadcast_to(v, (rows,)).copy() for k, v in values.items() if k not in _GRIDS}
-    each = values.get("cells", values.get("cell_size"))  # h^-3
+    whole = {k: np.broadcast_to(v, (rows,)).copy() for k, v in values.items()}
+    full = {k: v for k, v in whole.items() if k not in _GRIDS}
     conditions = _conditions(work, read, values.get("cells"), drift.get("thrust_N"))
     labels = next((tuple(r.texts["name"]) for _, r in read if len(r.texts.get("name", ())) == rows), ())
     sha256 = "+".join(r.sha256 for _, r in read)
     about: dict[str, Any] = {"file": name, "format": "cfd_run", "sha256": sha256}
     if rows == 1:
         about["means"] = {k: Mean(float(full[k][0]), over, drift.get(k)) for k, over in averaged.items()}
-    # A unit is asked for where the files state none
-    given = tuple(q for q in ("thrust", "torque") if (fact := getattr(work.run.columns, q)) and fact.unit)
+    given = tuple(q for q in ("thrust", "torque") if work.fact(q).unit)  # asked for where the files state none
     made = CfdRun("cfd", Path(name).name, full, {k: np.broadcast_to(v, (rows,)) for k, v in points.u.items()}, (),
                   about, labels, notes=tuple(dict.fromkeys(work.notes)), files=tuple(work.run.run.files),
                   conditions=conditions, averaged=averaged, drift=drift, units_given=given, zones=work.zones,
@@ -437,10 +418,10 @@ def _dataset(work: OpenRun, points: _Points, read: Sequence[tuple[str, Dataset]]
     if not keep.all():
         note = f"{number_of((~keep).sum(), 'point')} without a load left out"
         made = replace(made.select(keep), notes=(*made.notes, note))
-        each = None if each is None else np.broadcast_to(each, (rows,))[keep]
     made = replace(made, notes=(*_slips(made), *made.notes))
-    if each is not None and np.unique(each).size > 1:
-        return by_grid(made, each, None if "cells" in values else work.size_unit)
+    grids = next((whole[k][keep] for k in ("cells", "cell_size") if k in whole), np.zeros(0))  # or h^-3
+    if np.unique(grids).size > 1:
+        return by_grid(made, grids, None if "cells" in values else work.size_unit)
     u = _stated_grid(work)
     told = ", ".join(f"{k.split('_')[0]} {u[k]:.2%}" for k in ("thrust_N", "torque_Nm") if k in u)
     return with_grid_floor(made, u, (f"u of the grid: {told}, as stated",) if u else ())
@@ -460,26 +441,3 @@ def of_rotor(run: CfdRun, diameter_m: float, density_kg_m3: float) -> CfdRun:
     guessed = set(_slips(run))
     said = _slips(run, diameter_m, density_kg_m3)
     return replace(run, notes=(*said, *(note for note in run.notes if note not in guessed)))
-
-
-_SHOWN = {"rpm": "rev/min", "airspeed_m_s": "V [m/s]", "J": "J", "thrust_N": "thrust [N]",
-          "duct_thrust_N": "of it duct [N]", "torque_Nm": "torque [N m]", "power_W": "power [W]",
-          "CT": "CT", "CQ": "CQ", "CP": "CP"}  # fmt: skip
-
-
-def _with_u(x: float, u: float) -> str:
-    return number_text(x, 5) + (f" ± {number_text(u, 2)}" if math.isfinite(u) else "")
-
-
-def run_text(d: CfdRun) -> str:
-    """A run for a terminal: points with u, what was averaged, what was decided."""
-    averaged, drifts = d.averaged, d.drift
-    names = [k for k in _SHOWN if k in d]
-    rows = [[_with_u(d[k][i], d.u[k][i]) for k in names] for i in range(len(d))]
-    lines = [f"one run: {', '.join(Path(f).name for f in d.files)}"]
-    lines.append(text_table([_SHOWN[k] for k in names], rows, (), "  "))
-    for over in dict.fromkeys(averaged.values()):
-        own = [k.rsplit("_", 1)[0] for k, v in averaged.items() if v == over]
-        drift = ", ".join(f"{k.rsplit('_', 1)[0]} {v:+.2%}" for k, v in drifts.items() if averaged.get(k) == over)
-        lines.append(f"  {', '.join(own)}: {over}" + (f"; drift {drift}" if drift else ""))
-    return "\n".join([*lines, f"  set-up: {conditions_text(d.conditions)}", *(f"  ! {note}" for note in d.notes)])

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from bemt.base.tables import number_text
+from bemt.base.tables import few, number_text
 from bemt.data.readers import number
 from bemt.data.readers.references import Reference
 from bemt.data.recordings.audit import AuditLine, audit, facts_of, number_or
@@ -19,7 +19,7 @@ from bemt.physics.dataset import Dataset
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bemt.data.recordings.grid_study import LoadStudy
+    from bemt.data.recordings.grids import LoadStudy
 
 CONDITIONS = (
     "grid_level", "cells", "program", "solver", "gas", "turbulence", "domain", "domain_over_D", "sector", "steady",
@@ -198,7 +198,7 @@ def conditions_that_differ(a: Dataset | Conditions, b: Dataset | Conditions) -> 
     out = {}
     for name in CONDITIONS:
         if name in first and name in second and not _alike(name, first[name], second[name]):
-            out[name] = (_few(first[name]), _few(second[name]))
+            out[name] = (few(first[name]), few(second[name]))
     return out
 
 
@@ -215,10 +215,6 @@ def _alike(name: str, a: tuple[str, ...], b: tuple[str, ...]) -> bool:
         ends = zip(*((min(one), max(one)) for one in sizes), strict=True)
         return all(abs(x - y) <= _LIKE_CELLS * max(abs(x), abs(y)) for x, y in ends)
     return False
-
-
-def _few(values: tuple[str, ...]) -> str:
-    return ", ".join(values[:4]) + (", ..." if len(values) > 4 else "")
 
 
 def grid_that_differs(a: Dataset, b: Dataset) -> str:

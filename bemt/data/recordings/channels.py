@@ -11,14 +11,14 @@ import difflib
 import re
 import shlex
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from bemt.base import units
 from bemt.base.arrays import Array
-from bemt.base.tables import number_of
+from bemt.base.tables import few, number_of
 from bemt.data.readers.headings import USUAL, counts_electrical, may_be_shaft_speed, meanings, unit_alone
 from bemt.data.readers.recording import FULL_THROTTLE
 from bemt.physics.dataset import Dataset
@@ -177,85 +177,144 @@ def named(d: Dataset) -> Dataset:
     """
     n = len(d)
     d = d if d.lines else replace(d, lines=range(1, n + 1))
-    values: dict[str, Array] = {}
-    names: dict[str, str] = {}
-    notes: list[str] = []
-    out: list[DroppedCells] = []
-    for name, v in d.values.items():
-        if not d.unit(name) and name not in ("run", "rpm", *_SPEEDS):
-            continue
-        target = USUAL.get(name, name)
-        if target != name and (target in d or target in values):
-            continue
-        if target not in MEASURED and _base_of_u(name) is None:
-            continue
-        far = np.abs(v) > (HUGE if target != "time_s" else LATEST_S)
-        if far.any():
-            shown = ", ".join(f"{x:.3g}" for x in v[far][:3]) + (", ..." if far.sum() > 3 else "")
-            out += lost(d, np.flatnonzero(far), target, f"{shown}: no physical magnitude")
-        values[target], names[target] = np.where(far, np.nan, v) if far.any() else v, name
-    u = {USUAL.get(key, key): v for key, v in stated(d).items() if USUAL.get(key, key) in values}
-    for name in [k for k in values if _base_of_u(k) is not None]:
-        base = _base_of_u(name) or ""
-        base = USUAL.get(base, base)
-        column = values.pop(name)
-        names.pop(name)
-        if base in values:
-            out += lost(d, np.flatnonzero(column < 0.0), f"u_{base}", "a negative uncertainty")
-            u[base] = np.where(column < 0.0, np.nan, column)
-        else:
-            notes.append(f"{name}: uncertainty of a channel that the file has not; left out")
-    _angular(d, values, names, notes)
-    _speed(d, values, names, notes)
-    _command(values, names, notes)
-    # a heading that says power, and not whose
-    plain = names.get("power_W") == "power_W" and d.headings.get("power_W", "power_W") != "power_W"
-    bare = values.get("power_W") if plain else d.values.get("P_W")
-    # beside a thrust alone: no stand without a torque cell reads what a shaft takes
-    others = {"torque_Nm", "CP", "CQ", "voltage_V", "current_A"} & values.keys()
-    alone = plain and "thrust_N" in values and not others
-    _power(values, names, notes, bare, unit_alone(d.headings.get("P_W", "")) is not None, alone)
-    if plain and "power_W" in values:
-        notes.append(f"{AS_SHAFT}; if a wattmeter read it, name the column electrical_power_W")
-    none = int(np.sum(~np.isfinite(values["run"]))) if "run" in values else 0
-    if none:
+    seen = _Named(d)
+    seen.measured()
+    seen.uncertainties()
+    seen.angular()
+    seen.speed()
+    seen.command()
+    seen.power()
+    values, notes = seen.values, seen.notes
+    if none := int(np.sum(~np.isfinite(values["run"]))) if "run" in values else 0:
         notes.append(f"{number_of(none, 'row')} without a run: taken as run 0")
-    own = {key: d.unit(name) for key, name in names.items() if name in d}
-    about = {**d.provenance, "names": names, "dropped": tuple(out)}
-    return replace(
-        d, values=values or {"run": np.ones(n)}, u=u, u_by={}, provenance=about, notes=tuple(notes), units=own, texts={}
-    )
+    own = {key: d.unit(name) for key, name in seen.names.items() if name in d}
+    about = {**d.provenance, "names": seen.names, "dropped": tuple(seen.lost)}
+    return replace(d, values=values or {"run": np.ones(n)}, u=seen.u, u_by={}, provenance=about, notes=tuple(notes),
+                   units=own, texts={})  # fmt: skip
 
 
-def _angular(d: Dataset, values: dict[str, Array], names: dict[str, str], notes: list[str]) -> None:
-    """Speed of rotation from an angular speed, where the file has no other."""
-    found = [
-        k
-        for k in d.values
-        if d.unit(k) == "rad_s" and re.match(r"(omega|angular|rotation|motor|w|speed|[nωΩ]_)", k, re.I)
-    ]
-    if len(found) == 1 and not {"rpm", *_SPEEDS} & values.keys():
-        values["rpm"], names["rpm"] = d[found[0]] / units.RPM, found[0]
-        notes.append(f"rpm is {found[0]} in rev/min")
+@dataclass
+class _Named:
+    """A recording while its channels get their usual names: values, the names that the file has for them, notes."""
 
+    d: Dataset
+    values: dict[str, Array] = field(default_factory=dict)
+    names: dict[str, str] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    lost: list[DroppedCells] = field(default_factory=list)
+    u: dict[str, Array] = field(default_factory=dict)
 
-def _speed(d: Dataset, values: dict[str, Array], names: dict[str, str], notes: list[str]) -> None:
-    """Choose the speed of the rotor among those that the file has."""
-    if "rpm" in values:
-        return
-    for name in _SPEEDS:
-        if d.format == "table" and counts_electrical(d.headings.get(names.get(name, ""), "")):
-            notes.append(f"{name} is no speed of the rotor until it is divided by the pole pairs")
-        elif name in values and _alive(values[name]):
-            values["rpm"], names["rpm"] = values[name], names[name]
-            how = "" if name == "optical_rpm" else ": right only if the pole count set in the stand was right"
-            notes.append(f"rpm is {name}{how}")
+    def take(self, channel: str, name: str, values: Array, note: str) -> None:
+        """Take a column of the file for a channel."""
+        self.values[channel], self.names[channel] = values, name
+        self.notes.append(note)
+
+    def measured(self) -> None:
+        """Columns of known unit that a stand measures, and their uncertainties, without what no sensor reads."""
+        d, values = self.d, self.values
+        for name, v in d.values.items():
+            if not d.unit(name) and name not in ("run", "rpm", *_SPEEDS):
+                continue
+            target = USUAL.get(name, name)
+            twice = target != name and (target in d or target in values)
+            if twice or (target not in MEASURED and _base_of_u(name) is None):
+                continue
+            far = np.abs(v) > (HUGE if target != "time_s" else LATEST_S)
+            if far.any():
+                shown = few([f"{x:.3g}" for x in v[far][:4]], 3)
+                self.lost += lost(d, np.flatnonzero(far), target, f"{shown}: no physical magnitude")
+            values[target], self.names[target] = np.where(far, np.nan, v) if far.any() else v, name
+
+    def uncertainties(self) -> None:
+        """Put columns of uncertainties with the channels they are of."""
+        values = self.values
+        self.u = {USUAL.get(key, key): v for key, v in stated(self.d).items() if USUAL.get(key, key) in values}
+        for name, base in [(k, base) for k in values if (base := _base_of_u(k)) is not None]:
+            base = USUAL.get(base, base)
+            column = values.pop(name)
+            del self.names[name]
+            if base in values:
+                self.lost += lost(self.d, np.flatnonzero(column < 0.0), f"u_{base}", "a negative uncertainty")
+                self.u[base] = np.where(column < 0.0, np.nan, column)
+            else:
+                self.notes.append(f"{name}: uncertainty of a channel that the file has not; left out")
+
+    def angular(self) -> None:
+        """Speed of rotation from an angular speed, where the file has no other."""
+        words = re.compile(r"(omega|angular|rotation|motor|w|speed|[nωΩ]_)", re.IGNORECASE)
+        found = [k for k in self.d.values if self.d.unit(k) == "rad_s" and words.match(k)]
+        if len(found) == 1 and not {"rpm", *_SPEEDS} & self.values.keys():
+            self.take("rpm", found[0], self.d[found[0]] / units.RPM, f"rpm is {found[0]} in rev/min")
+
+    def speed(self) -> None:
+        """Choose the speed of the rotor among those that the file has."""
+        d, values = self.d, self.values
+        if "rpm" in values:
             return
-    for name, condition in _DRIVE_SPEEDS.items():
-        if name in d.values and _alive(d[name]):
-            values["rpm"], names["rpm"] = d[name], name
-            notes.append(f"rpm is {name}: {condition}")
+        for name in _SPEEDS:
+            if d.format == "table" and counts_electrical(d.headings.get(self.names.get(name, ""), "")):
+                self.notes.append(f"{name} is no speed of the rotor until it is divided by the pole pairs")
+            elif name in values and _alive(values[name]):
+                how = "" if name == "optical_rpm" else ": right only if the pole count set in the stand was right"
+                return self.take("rpm", self.names[name], values[name], f"rpm is {name}{how}")
+        for name, condition in _DRIVE_SPEEDS.items():
+            if name in d.values and _alive(d[name]):
+                return self.take("rpm", name, d[name], f"rpm is {name}: {condition}")
+
+    def command(self) -> None:
+        """A throttle is a command as a pulse width is: what needs one takes either."""
+        throttle = self.values.get("throttle")
+        if throttle is None or "pwm_s" in self.values or not np.isfinite(throttle).any():
             return
+        if np.nanmin(throttle) >= 0.0 and np.nanmax(throttle) <= FULL_THROTTLE:
+            self.take("pwm_s", self.names["throttle"], pulse_of(throttle), THROTTLE_IS_PULSE)
+
+    def power(self) -> None:
+        """Electrical power from its factors, and whose power it is under a heading that does not say so."""
+        d, values, names = self.d, self.values, self.names
+        plain = names.get("power_W") == "power_W" and d.headings.get("power_W", "power_W") != "power_W"
+        bare = values.get("power_W") if plain else d.values.get("P_W")
+        if bare is not None:
+            # beside a thrust alone: no stand without a torque cell reads what a shaft takes
+            others = {"torque_Nm", "CP", "CQ", "voltage_V", "current_A"} & values.keys()
+            alone = plain and "thrust_N" in values and not others
+            if self._metered(bare, alone):
+                own = names["electrical_power_W"] = names.pop("power_W", "P_W")
+                values["electrical_power_W"] = values.pop("power_W", bare)
+                note = f"{own} is electrical_power_W: no torque is beside it"
+                self.notes.append(AS_ELECTRICAL if alone else note)
+            elif "power_W" not in values:
+                self._by_factors(bare)
+        if "electrical_power_W" not in values and (electric := electrical_power(values)) is not None:
+            values["electrical_power_W"], names["electrical_power_W"] = electric, "voltage_V x current_A"
+        if plain and "power_W" in values:
+            self.notes.append(f"{AS_SHAFT}; if a wattmeter read it, name the column electrical_power_W")
+
+    def _metered(self, bare: Array, alone: bool) -> bool:
+        """Whether a power is what a wattmeter reads: no torque is beside it, and no shaft takes that much."""
+        values = self.values
+        in_watts = unit_alone(self.d.headings.get("P_W", "")) is not None  # as an instrument shows it, and no more
+        if not (in_watts or alone or {"voltage_V", "current_A"} & values.keys()):
+            return False
+        product = electrical_power(values)
+        with np.errstate(all="ignore"):
+            share = 1.0 if product is None else float(np.nanmedian(np.abs(bare / product)))
+        return share > _NO_MOTOR and not {"torque_Nm", "electrical_power_W"} & values.keys()
+
+    def _by_factors(self, bare: Array) -> None:
+        """Take a power for that of the shaft, or the electrical one, if it goes with the product of its factors."""
+        values = self.values
+        for name, product in (("power_W", shaft_power(values)), ("electrical_power_W", electrical_power(values))):
+            if product is None or name in values:
+                continue
+            with np.errstate(all="ignore"):
+                ratio = np.abs(bare / product)
+            good = ratio[np.isfinite(ratio) & (ratio > 0.0)]
+            usual = float(np.median(good)) if good.size >= 3 else np.nan
+            if good.size >= 3 and float(np.median(np.abs(good / usual - 1.0))) < 0.005:
+                times = "" if abs(usual - 1.0) < 0.02 else f", {usual:.4g} times"
+                return self.take(name, "P_W", bare, f"P_W is {name}: it goes with the product of its factors{times}")
+        self.notes.append("P_W: shaft or electrical power? Ignored; name it power_W or electrical_power_W")
 
 
 THROTTLE_IS_PULSE = "throttle read as 1000 us at 0 % and 2000 us at 100 %, which the file does not say"
@@ -264,16 +323,6 @@ THROTTLE_IS_PULSE = "throttle read as 1000 us at 0 % and 2000 us at 100 %, which
 def pulse_of(throttle: Array) -> Array:
     """Pulse width that a throttle stands for where the file has none, (N,) [s]."""
     return 1e-3 + 1e-3 * throttle
-
-
-def _command(values: dict[str, Array], names: dict[str, str], notes: list[str]) -> None:
-    """A throttle is a command as a pulse width is: what needs one takes either."""
-    throttle = values.get("throttle")
-    if throttle is None or "pwm_s" in values or not np.isfinite(throttle).any():
-        return
-    if np.nanmin(throttle) >= 0.0 and np.nanmax(throttle) <= FULL_THROTTLE:
-        values["pwm_s"], names["pwm_s"] = pulse_of(throttle), names["throttle"]
-        notes.append(THROTTLE_IS_PULSE)
 
 
 def without_unit(d: Dataset) -> frozenset[str]:
@@ -299,43 +348,3 @@ def electrical_power(values: Mapping[str, Array]) -> Array | None:
     """Electrical power, voltage times current, (N,) [W]."""
     volts, amps = values.get("voltage_V"), values.get("current_A")
     return None if volts is None or amps is None else volts * amps
-
-
-def _power(
-    values: dict[str, Array], names: dict[str, str], notes: list[str], bare: Array | None, shown: bool, alone: bool
-) -> None:
-    """Electrical power from its factors, and what a bare P stands for: without a torque, it is a wattmeter's.
-
-    ``shown``: whether it is headed as an instrument shows it, in watts and no more; ``alone``: whether nothing but a
-    thrust is beside it.
-    """
-    beside = shown or alone or {"voltage_V", "current_A"} & values.keys()
-    product = electrical_power(values)
-    with np.errstate(all="ignore"):
-        share = 1.0 if bare is None or product is None else float(np.nanmedian(np.abs(bare / product)))
-    metered = beside and share > _NO_MOTOR and not {"torque_Nm", "electrical_power_W"} & values.keys()
-    if bare is not None and metered:
-        names["electrical_power_W"] = names.pop("power_W", "P_W")
-        values["electrical_power_W"] = values.pop("power_W", bare)
-        own = f"{names['electrical_power_W']} is electrical_power_W: no torque is beside it"
-        notes.append(AS_ELECTRICAL if alone else own)
-    elif bare is not None and "power_W" not in values:
-        shaft = shaft_power(values)
-        electric = electrical_power(values)
-        for name, product in (("power_W", shaft), ("electrical_power_W", electric)):
-            if product is None or name in values:
-                continue
-            with np.errstate(all="ignore"):
-                ratio = np.abs(bare / product)
-            good = ratio[np.isfinite(ratio) & (ratio > 0.0)]
-            usual = float(np.median(good)) if good.size >= 3 else np.nan
-            if good.size >= 3 and float(np.median(np.abs(good / usual - 1.0))) < 0.005:
-                values[name], names[name] = bare, "P_W"
-                times = "" if abs(usual - 1.0) < 0.02 else f", {usual:.4g} times"
-                notes.append(f"P_W is {name}: it goes with the product of its factors{times}")
-                break
-        else:
-            notes.append("P_W: shaft or electrical power? Ignored; name it power_W or electrical_power_W")
-    if "electrical_power_W" not in values and (electric := electrical_power(values)) is not None:
-        values["electrical_power_W"] = electric
-        names["electrical_power_W"] = "voltage_V x current_A"

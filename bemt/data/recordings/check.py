@@ -1,8 +1,8 @@
 """Sanity before physics: faults of a recording, each named with its evidence and the correction it would take.
 
 Nothing is corrected here. The checks work with whatever channels there are, and say nothing where they cannot know:
-slips of units (:mod:`bemt.data.recordings.slips`); columns, signs and physical bounds
-(:mod:`bemt.data.recordings.columns`). A new check is one function with the decorator ``check_for``.
+slips of units (:mod:`bemt.data.recordings.slips`); columns (:mod:`bemt.data.recordings.columns`), signs and physical
+bounds (:mod:`bemt.data.recordings.limits`). A new check is one function with the decorator ``check_for``.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from bemt.data.recordings import columns, slips  # they register themselves
+from bemt.data.recordings import columns, limits, slips  # they register themselves
 from bemt.data.recordings.channels import file_name, named
 from bemt.data.recordings.findings import CHECKS, SEVERITIES, Finding, facts_of
 from bemt.physics.dataset import Dataset
 
 __all__ = ["Finding", "check", "left_out"]
 
-_ROOMS = (slips, columns)
+_ROOMS = (slips, columns, limits)
 LEFT_OUT = ("misread", "stuck_sensor")
 OPEN_OR_OUT = (*LEFT_OUT, "unnamed_column")
 """Findings whose readings are left out, and these with what is to be asked about."""

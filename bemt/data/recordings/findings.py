@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
+from bemt.base.tables import some
 from bemt.data.recordings.channels import asks, named, names_of
 from bemt.physics.air import LIQUID
 from bemt.physics.dataset import Dataset
@@ -80,9 +81,9 @@ class Facts:
         v = self.values.get(name)
         return v if v is not None and bool(np.any(np.isfinite(v))) else None
 
-    def first(self, *names: str) -> tuple[str, Array] | None:
-        """First channel of these with a finite value."""
-        return next(((name, v) for name in names if (v := self.get(name)) is not None), None)
+    def known(self, *names: str) -> Iterator[tuple[str, Array]]:
+        """Channels of these with a finite value."""
+        return ((name, v) for name in names if (v := self.get(name)) is not None)
 
     def named(self, name: str) -> str:
         """Name in the file."""
@@ -197,9 +198,7 @@ def facts_of(
 
 def where_of(facts: Facts, rows: Array | NDArray[np.intp]) -> str:
     """Lines of the first of some rows."""
-    lines = [str(facts.lines[int(r)]) for r in rows[:6]]
-    more = f" and {len(rows) - 6} more" if len(rows) > 6 else ""
-    return f"line{'s' if len(rows) > 1 else ''} {', '.join(lines)}{more}"
+    return f"line{'s' if len(rows) > 1 else ''} {some((facts.lines[int(r)] for r in rows), 6)}"
 
 
 # Rows from which a recording is a log, and share of those under load that are misread in one.

@@ -8,7 +8,6 @@ that the user states.
 from __future__ import annotations
 
 import os
-import shlex
 import traceback
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -19,12 +18,12 @@ import numpy as np
 
 from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError, system_fault
+from bemt.base.tables import some
 from bemt.data import readers as importers
 from bemt.data.readers.cfd_run import KIND as RUN
 from bemt.data.readers.cfd_run import RunHead, RunToml
+from bemt.data.readers.left_open import one_step
 from bemt.data.readers.marks import EXPORT
-from bemt.data.readers.recording import kept_beside
-from bemt.data.readers.split import some
 from bemt.data.readers.uiuc import NO_SPEED
 from bemt.data.recordings import cfd_run
 from bemt.data.recordings.adapt import (
@@ -36,7 +35,7 @@ from bemt.data.recordings.adapt import (
     reduction_of,
 )
 from bemt.data.recordings.cfd_files import PROGRAMS, cfd_files, other_than_loads
-from bemt.data.recordings.grid_study import merged, of_table
+from bemt.data.recordings.grids import merged, of_table
 from bemt.data.recordings.reduce import reduction
 from bemt.data.recordings.shown import INTERNAL, Imported, ImportedFile, options_of
 from bemt.physics.dataset import Dataset
@@ -98,10 +97,9 @@ def _unsettled(record: Dataset) -> list[str]:
     if record.clock not in ("time", "iteration"):
         return []
     means: Mapping[str, Mean] = record.means
-    top: dict[str, float] = {}
+    top: dict[str, float] = {"": 0.0}
     for name, mean in means.items():
-        unit = record.unit(name)
-        if unit:
+        if unit := record.unit(name):
             top[unit] = max(top.get(unit, 0.0), abs(mean.value))
     moving = [
         f"{name} {mean.drift:+.2%}"
@@ -109,10 +107,9 @@ def _unsettled(record: Dataset) -> list[str]:
         if mean.drift is not None
         and abs(mean.drift) > SETTLED
         and not name.lower().startswith(("rms[", "res_"))
-        and abs(mean.value) >= 0.05 * top.get(record.unit(name), 0.0)
+        and abs(mean.value) >= 0.05 * top[record.unit(name)]
     ]
-    more = f" and {len(moving) - 6} more" if len(moving) > 6 else ""
-    return [f"not settled (drift over the averaged part): {', '.join(moving[:6])}{more}"] if moving else []
+    return [f"not settled (drift over the averaged part): {some(moving, 6)}"] if moving else []
 
 
 def import_files(
@@ -135,17 +132,23 @@ def import_files(
             records[name] = stated[name] if name in stated else import_file(name, format, choice)
         except Exception as error:  # the other files are read all the same
             errors[name] = _refusal(error)
-    exports = {n: other_than_loads(r.values) for n, r in records.items() if r.kind == "cfd" and not cfd_run.is_run(r)}
-    if exports and all((*exports.values(), not runs)):
-        for name, what in exports.items():
-            errors[name] = str(Fault(name, "", f"{what}: {some(records.pop(name).values, 8)}", cfd_run.NO_LOAD, EXPORT))
-        to_do = None
+    if none := _without_loads(records, bool(runs)):
+        records = {name: record for name, record in records.items() if name not in none}
+        errors, to_do = errors | none, None
     told = {d.file for d in runs}
     runs = [*runs, *(d for d in records.values() if cfd_run.is_run(d) and d.file not in told)]
-    if rotor is not None:
-        runs = [cfd_run.of_rotor(d, *rotor) if cfd_run.is_run(d) else d for d in runs]
+    made = [d if rotor is None else cfd_run.of_rotor(d, *rotor) for d in runs if cfd_run.is_run(d)]
     files = [_file(name, format, records.get(name), errors.get(name), rotor or ()) for name in names]
-    return Imported(tuple(files), tuple(d for d in runs if cfd_run.is_run(d)), to_do)
+    return Imported(tuple(files), tuple(made), to_do)
+
+
+def _without_loads(records: Mapping[str, Dataset], run: bool) -> dict[str, str]:
+    """Refusals of the exports of a CFD program, by file, where none of them has a load and they make no run."""
+    alone = {n: r for n, r in records.items() if r.kind == "cfd" and not cfd_run.is_run(r)}
+    what = {n: other_than_loads(r.values) for n, r in alone.items()}
+    if run or not all(what.values()):
+        return {}
+    return {n: str(Fault(n, "", f"{what[n]}: {some(r.values, 8)}", cfd_run.NO_LOAD, EXPORT)) for n, r in alone.items()}
 
 
 def as_stated(files: Sequence[Any], run: Mapping[str, Any]) -> list[Any]:
@@ -155,7 +158,8 @@ def as_stated(files: Sequence[Any], run: Mapping[str, Any]) -> list[Any]:
     """
     if not any(v is not None and v != [] for v in run.values()):
         return list(files)
-    from bemt.data.recordings.cfd_options import run_from, stated_frame
+    from bemt.data.recordings.cfd_options import run_from
+    from bemt.data.recordings.stated import stated_frame
 
     if not run.get("zones") and all(hasattr(f, "columns") or is_measured(f) for f in files):
         told: list[list[str]] = [run.get(name) or [] for name in ("unit", "column", "sign", "ignore")]
@@ -195,7 +199,7 @@ def _stated(
     Pole pairs and headings to ignore are stated to ``import`` alone: its next step is the file that keeps them.
     """
     from bemt.data.readers.recording_toml import RecordingToml, joined
-    from bemt.data.recordings.cfd_options import filled, recording_from
+    from bemt.data.recordings.stated import filled, recording_from
 
     if unit or column or sign or pole_pairs or ignore:
         made = RecordingToml.model_validate(recording_from(file, unit, column, sign, pole_pairs, ignore=ignore))
@@ -207,7 +211,7 @@ def _stated(
     if pole_pairs or ignore:
         options = options_of({"unit": unit, "column": column, "sign": sign, "ignore": ignore,
                               "pole-pairs": [pole_pairs] if pole_pairs else []})  # fmt: skip
-        about["step"] = f"bemt import {shlex.quote(file)} {' '.join(options)} --out {kept_beside([Path(file)])[0]}"
+        about["step"] = one_step(file, options)
     return replace(record, provenance=about)
 
 
@@ -226,12 +230,13 @@ def _runs_and_exports(names: Sequence[str], insist: bool) -> tuple[list[Dataset]
     """Which names are a run by themselves, as a run.toml is, and which are exports of CFD programs."""
     runs, exports = [], list[str]()
     for name in names:
+        at = Path(name)
         try:
-            if Path(name).is_dir() and not (Path(name) / "run.toml").is_file():
-                exports += map(str, cfd_files(Path(name)))
-            elif Path(name).is_dir() or importers.detect(name) == RUN:
+            if at.is_dir() and not (at / "run.toml").is_file():
+                exports += map(str, cfd_files(at))
+            elif (kind := RUN if at.is_dir() else importers.detect(name)) == RUN:
                 runs.append(import_file(name))
-            elif importers.detect(name) in PROGRAMS:
+            elif kind in PROGRAMS:
                 exports.append(name)
         except (InputError, OSError):
             if insist:

@@ -21,9 +21,8 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.base.tables import number_of
+from bemt.base.tables import number_of, some
 from bemt.base.units import ZERO_CELSIUS
-from bemt.data.readers.split import some
 from bemt.data.recordings.channels import (
     LOADS,
     DroppedCells,
@@ -40,14 +39,13 @@ from bemt.data.recordings.points import (
     TARED,
     Found,
     Point,
-    TareZero,
     command_of,
-    from_rest,
     from_rows,
     from_samples,
     is_samples,
 )
 from bemt.data.recordings.scatter import Hysteresis, hysteresis, repeats, session
+from bemt.data.recordings.zero import TareZero, from_rest
 from bemt.physics import coefficients as co
 from bemt.physics.air import AIR_C, GAMMA, R_DRY, Air
 from bemt.physics.dataset import Dataset
@@ -162,8 +160,7 @@ def _flow(values: Mapping[str, Array]) -> Array | None:
     v = values.get("airspeed_m_s")
     if v is None or not np.any(np.abs(np.nan_to_num(v)) > 0.0):
         return values.get("J")
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.nan_to_num(v / values["rpm"] * 60.0) if "rpm" in values else None
+    return np.nan_to_num(v / values["rpm"] * 60.0) if "rpm" in values else None
 
 
 def _outliers(rec: Dataset, found: Found) -> None:
@@ -269,7 +266,6 @@ def _series(
     air: AirOfPoints, diameter: float | None,
 ) -> Dataset:  # fmt: skip
     """Channels and derived ones, as a `Dataset`."""
-    n = len(found.points)
     shown = {k: v for k, v in values.items() if k not in ("humidity", "electrical_rpm", "optical_rpm")}
     if len({p.run for p in found.points}) > 1 or "run" in rec.values:
         shown["run"] = np.array([p.run for p in found.points])
@@ -278,16 +274,14 @@ def _series(
     said = recording.provenance
     file = str(said.get("file", recording.name))
     short = file.replace("\\", "/").rsplit("/", 1)[-1]
-    labels = []
-    for p in found.points:
-        first, last = rec.lines[p.rows[0]], rec.lines[p.rows[-1]]
-        labels.append(f"{short}:{first}" + (f"-{last}" if len(p.rows) > 1 else ""))
+    ends = [[rec.lines[row] for row in dict.fromkeys((p.rows[0], p.rows[-1]))] for p in found.points]
+    labels = [f"{short}:{'-'.join(map(str, lines))}" for lines in ends]
     provenance = {k: v for k, v in said.items() if isinstance(v, str)}
     series = Dataset("bench", str(said.get("run_name", short)), shown, {k: v for k, v in u.items() if k in shown},
                     tuple(p.flags for p in found.points), provenance, tuple(labels))  # fmt: skip
     if diameter is None:
         if {"torque_Nm", "rpm"} <= shown.keys() and "power_W" not in shown:
-            series = series.derive(1.0, np.full(n, np.nan))
+            series = series.derive(1.0, np.full(len(series), np.nan))
             keep = [k for k in series.values if k in shown or k == "power_W"]
             series = replace(series, values={k: series[k] for k in keep}, u={k: series.u[k] for k in keep})
         return series
@@ -304,14 +298,12 @@ def _numbers(series: Dataset, air: AirOfPoints, D: float) -> Dataset:
     if rpm is not None and np.any(np.isfinite(air.a_sound)):
         more["M_tip"] = np.asarray(co.M_tip(rpm / 60.0, D, air.a_sound), dtype=float)
     if {"CT", "CP"} <= series.values.keys():
-        with np.errstate(all="ignore"):
-            fm = np.asarray(co.FM(series.CT, series.CP, np.nan_to_num(V)), dtype=float)
-            share = np.hypot(1.5 * series.u_CT / series.CT, series.u_CP / series.CP)
+        fm = np.asarray(co.FM(series.CT, series.CP, np.nan_to_num(V)), dtype=float)
+        share = np.hypot(1.5 * series.u_CT / series.CT, series.u_CP / series.CP)
         more["FM"], u_more["FM"] = fm, np.abs(fm * share)
     if {"thrust_N", "power_W"} <= series.values.keys():
-        with np.errstate(all="ignore"):
-            ratio = np.where(series.power_W > 0, series.thrust_N / series.power_W, np.nan)
-            share = np.hypot(series.u_thrust_N / series.thrust_N, series.u_power_W / series.power_W)
+        ratio = np.where(series.power_W > 0, series.thrust_N / series.power_W, np.nan)
+        share = np.hypot(series.u_thrust_N / series.thrust_N, series.u_power_W / series.power_W)
         more["efficacy_N_W"], u_more["efficacy_N_W"] = ratio, np.abs(ratio * share)
     u_more = {k: np.where(np.isfinite(v), v, np.nan) for k, v in u_more.items()}
     return replace(series, values={**series.values, **more}, u={**series.u, **u_more})

@@ -27,8 +27,7 @@ from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK
 from bemt.data.readers.cfd_run import KIND as RUN
 from bemt.data.readers.headings import USUAL
 from bemt.data.readers.recording import Remark
-from bemt.data.recordings import cfd_run
-from bemt.data.recordings.cfd_setup import CfdRun
+from bemt.data.recordings.cfd_setup import CfdRun, conditions_text
 from bemt.data.recordings.channels import named
 from bemt.data.recordings.findings import Finding
 from bemt.data.recordings.reduce import Reduction, reduction
@@ -90,15 +89,7 @@ def points_text(reduced: Dataset | str) -> list[str]:
     if isinstance(reduced, str):
         return [f"  not reduced: {reduced}"]
     how, n = reduction(reduced), len(reduced)
-    values, stated_u = ({k: v for k, v in d.items() if np.isfinite(v).any()} for d in (reduced.values, reduced.u))
-    if "throttle" in values:  # one command
-        values.pop("pwm_s", None)
-    columns = {"from": [label.rsplit(":", 1)[-1] for label in reduced.labels or ("",) * n]}
-    for name in (k for k in SHOWN if k in values):
-        columns[name] = [_cell(name, x, 5) for x in values[name][:MOST]]
-        if name in stated_u:
-            columns[f"u({name})"] = [_cell("", x, 2) for x in stated_u[name][:MOST]]
-    columns["flags"] = [", ".join(flags) or "-" for flags in reduced.flags]
+    columns = _columns_of_points(reduced)
     many = "" if n <= MOST else f", the first {MOST} of them"
     what = "one per row" if how.mode == "points" else "means of plateaus"
     rows = list(zip(*(column[:MOST] for column in columns.values()), strict=True))
@@ -109,6 +100,19 @@ def points_text(reduced: Dataset | str) -> list[str]:
         tables.text_table(list(columns), rows, (len(columns) - 1,), "    "),
         *_dropped(how), *(f"  shared by all points, {text}" for text in shared), *(f"  . {t}" for t in reduced.notes),
     ]  # fmt: skip
+
+
+def _columns_of_points(points: Dataset) -> dict[str, list[str]]:
+    """Cells of a table of points by heading: lines of the file, channels with their u, flags."""
+    values, stated_u = ({k: v for k, v in d.items() if np.isfinite(v).any()} for d in (points.values, points.u))
+    if "throttle" in values:  # one command
+        values.pop("pwm_s", None)
+    columns = {"from": [label.rsplit(":", 1)[-1] for label in points.labels or ("",) * len(points)]}
+    for name in (k for k in SHOWN if k in values):
+        columns[name] = [_cell(name, x, 5) for x in values[name][:MOST]]
+        if name in stated_u:
+            columns[f"u({name})"] = [_cell("", x, 2) for x in stated_u[name][:MOST]]
+    return columns | {"flags": [", ".join(flags) or "-" for flags in points.flags]}
 
 
 def _curve(record: Dataset) -> list[str]:
@@ -135,6 +139,29 @@ def _dropped(how: Reduction) -> Iterator[str]:
         text = ranges(lines)
         text = text if len(text) <= 90 else text[:90].rsplit(",", 1)[0] + ", ..."
         yield f"  dropped {sum(b - a + 1 for a, b in lines)} {what} (lines {text}): {reason}"
+
+
+_OF_RUNS = {"rpm": "rev/min", "airspeed_m_s": "V [m/s]", "J": "J", "thrust_N": "thrust [N]",
+          "duct_thrust_N": "of it duct [N]", "torque_Nm": "torque [N m]", "power_W": "power [W]",
+          "CT": "CT", "CQ": "CQ", "CP": "CP"}  # fmt: skip
+
+
+def _with_u(x: float, u: float) -> str:
+    return tables.number_text(x, 5) + (f" ± {tables.number_text(u, 2)}" if math.isfinite(u) else "")
+
+
+def run_text(d: CfdRun) -> str:
+    """A run for a terminal: points with u, what was averaged, what was decided."""
+    averaged, drifts = d.averaged, d.drift
+    names = [k for k in _OF_RUNS if k in d]
+    rows = [[_with_u(d[k][i], d.u[k][i]) for k in names] for i in range(len(d))]
+    lines = [f"one run: {', '.join(Path(f).name for f in d.files)}"]
+    lines.append(tables.text_table([_OF_RUNS[k] for k in names], rows, (), "  "))
+    for over in dict.fromkeys(averaged.values()):
+        own = [k.rsplit("_", 1)[0] for k, v in averaged.items() if v == over]
+        drift = ", ".join(f"{k.rsplit('_', 1)[0]} {v:+.2%}" for k, v in drifts.items() if averaged.get(k) == over)
+        lines.append(f"  {', '.join(own)}: {over}" + (f"; drift {drift}" if drift else ""))
+    return "\n".join([*lines, f"  set-up: {conditions_text(d.conditions)}", *(f"  ! {note}" for note in d.notes)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,15 +215,25 @@ class ImportedFile:
             f"  ! {f.severity}: {f.id} in {f.channel}: {f.evidence}. Suggestion: {f.correction}" for f in self.findings
         ]
         errors = [text for f, text in zip(self.findings, told, strict=True) if f.severity == "error"]
-        lines, rows, plain = [self.title, *errors], [], []
         curve = self.reduced is None and not self.record.clock and bool({"CT", "CP", "CQ"} & self.record.values.keys())
-        for name in self.record.values:
-            unit, found = self.record.unit(name).replace("_", "/"), self.means.get(name)  # SI: m_s, rad_s
-            if curve or found is None or not math.isfinite(found.value):
+        lines = [self.title, *errors, *self._channels_text(self.record, {} if curve else self.means)]
+        lines += points_text(self.reduced) if self.reduced is not None else _curve(self.record) if curve else []
+        step = self.step.partition("   (")[0]  # it stands under Next
+        lines += [f"  {'.' if isinstance(w, Remark) else '!'} {w}" for w in self.warnings if not step or step not in w]
+        lines += [text for text in told if text not in errors]
+        return "\n".join(lines)
+
+    def _channels_text(self, record: Dataset, means: Mapping[str, Mean]) -> list[str]:
+        """Table of the channels with a mean, and the names of the others."""
+        rows, plain = [], []
+        for name in record.values:
+            unit, found = record.unit(name).replace("_", "/"), means.get(name)  # SI: m_s, rad_s
+            if found is None or not math.isfinite(found.value):
                 plain.append(f"{name} [{unit}]" if unit not in ("", "-", "1") else name)
                 continue
             drift = "-" if found.drift is None else f"{found.drift:+.2%}"
             rows.append([name, unit or "-", tables.number_text(found.value, 6), drift, found.over])
+        lines = []
         if len(rows) > _ROWS:  # of a report by zones the sums, with their parts in JSON
             sums = [row for row in rows if "_total_" in row[0]] or rows[:_ROWS]
             lines.append(f"  {len(sums)} of {len(rows)} channels (--json has all):")
@@ -207,11 +244,7 @@ class ImportedFile:
         if plain:
             lead = "  not averaged: " if rows else "  channels: "
             lines.append(textwrap.fill(", ".join(plain), 110, initial_indent=lead, subsequent_indent="    "))
-        lines += points_text(self.reduced) if self.reduced is not None else _curve(self.record) if curve else []
-        step = self.step.partition("   (")[0]  # it stands under Next
-        lines += [f"  {'.' if isinstance(w, Remark) else '!'} {w}" for w in self.warnings if not step or step not in w]
-        lines += [text for text in told if text not in errors]
-        return "\n".join(lines)
+        return lines
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,7 +278,7 @@ class Imported:
         shown = [f for f in self.files if f.format != RUN and f.error is None]
         lines = [f.title if f.path in own else f.text + "\n" for f in shown]
         grids = {name for run in self.runs if run.studies for name in run.files if name != run.file}  # of its study
-        lines += [cfd_run.run_text(run) + "\n" for run in self.runs if run.file not in grids]
+        lines += [run_text(run) + "\n" for run in self.runs if run.file not in grids]
         if self.to_do and self.files:
             steps = "\n".join(f"  ! {line}" for line in self.to_do.splitlines())
             lines.append(f"To use it as a CFD run, and --out run.toml to keep it:\n{steps}\n")
@@ -271,9 +304,10 @@ class Imported:
                   if g.id == "sign_flipped" and g.severity == "warning"} for f in self.files]  # fmt: skip
         if turned := sorted(set[str]().union(*flips).intersection(*flips)):
             said = {**said, "sign": [*said.get("sign", ()), *(f"{quantity}=-1" for quantity in turned)]}
-        read = [(f.path, f.record.kind, set(named(f.record).values)) for f in self.files if f.record]
-        loaded = [shlex.quote(p) for p, _, known in read if _LOADS & known and "rpm" in {*known, *said}]
-        alone = [shlex.quote(p) for p, kind, known in read if kind == "bench" and _LOADS & known]
+        read = [(shlex.quote(f.path), f.record.kind, set(named(f.record).values)) for f in self.files if f.record]
+        read = [(path, kind, known) for path, kind, known in read if _LOADS & known]
+        loaded = [path for path, _, known in read if "rpm" in {*known, *said}]
+        alone = [path for path, kind, _ in read if kind == "bench"]
         how = options_of({k: v for k, v in said.items() if k in ("unit", "column", "sign")})
         if alone and not loaded:
             pair = " ".join(["bemt compare", *(alone if len(alone) == 2 else [alone[0], "ANOTHER_RUN"]), *how])

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from bemt.base import unit_errors
 from bemt.base.arrays import Array
+from bemt.base.tables import some
 from bemt.data.readers.samples import MOST_RPM_PER_V
 from bemt.data.recordings.findings import MOTOR_EFFICIENCY, Facts, Finding, check_for
 from bemt.physics import k1k2 as empirical
@@ -167,8 +168,7 @@ def relations(facts: Facts) -> list[Relation]:
             usual: tuple[float, float], rows: NDArray[np.bool_] = still, exact: bool = False) -> None:  # fmt: skip
         if not powers.keys() <= q.keys():
             return
-        with np.errstate(all="ignore"):
-            v = np.exp(sum(p * np.log(q[k]) for k, p in powers.items())) * scale
+        v = np.exp(sum(p * np.log(q[k]) for k, p in powers.items())) * scale
         v = np.broadcast_to(v, rows.shape)[rows]
         v = v[np.isfinite(v) & (v > 0.0)]
         if v.size < (1 if facts.settled else _FEWEST):
@@ -305,9 +305,8 @@ def _electrical(facts: Facts, broken: list[Relation]) -> tuple[float, float, flo
         return None
     if any("P" not in r.powers for r in broken):
         return None  # something else is wrong, and may be the reason
-    with np.errstate(all="ignore"):
-        ratio = (2.0 * math.pi * q["Q"] * q["n"] / q["P"])[facts.loaded]
-        battery = (q["P"] / q["E"])[facts.loaded] if "E" in q else np.ones(1)
+    ratio = (2.0 * math.pi * q["Q"] * q["n"] / q["P"])[facts.loaded]
+    battery = (q["P"] / q["E"])[facts.loaded] if "E" in q else np.ones(1)
     ratio, battery = ratio[np.isfinite(ratio)], battery[np.isfinite(battery)]
     if ratio.size < 3 or (battery.size and abs(float(np.median(battery)) - 1.0) > 0.1):
         return None
@@ -430,7 +429,7 @@ def _likely(quantity: str, log_factor: float) -> list[Slip]:
 
 
 def _evidence(odd: _Odd) -> str:
-    names = ", ".join(w.name for w in odd.rest[:3]) + (f" and {len(odd.rest) - 3} more" if len(odd.rest) > 3 else "")
+    names = some((w.name for w in odd.rest), 3)
     agree = f", which agree within {math.expm1(max(odd.spread, 0.01)):.0%}" if len(odd.rest) > 1 else ""
     return f"readings over what the case gives are {math.exp(odd.by):.4g} times those of {names}{agree}"
 

@@ -13,9 +13,8 @@ from functools import cached_property
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
-from bemt.base.tables import number_of
+from bemt.base.tables import number_of, some
 from bemt.base.units import ZERO_CELSIUS
-from bemt.data.readers.split import some
 from bemt.data.recordings import cfd_setup
 from bemt.judge.compare import smooth_change as fits
 from bemt.judge.compare.drive_laws import (

@@ -14,7 +14,7 @@ import numpy as np
 from bemt.base.action import Answered, Told
 from bemt.base.errors import Fault, InputError, refuse, system_fault
 from bemt.base.given import number, path_text
-from bemt.data.recordings.grid_study import together
+from bemt.data.recordings.grids import together
 from bemt.data.recordings.load import as_stated, import_file, stated_options
 from bemt.data.recordings.shown import options_of
 from bemt.judge.compare import one_run

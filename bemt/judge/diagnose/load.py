@@ -65,11 +65,11 @@ def load(
     airspeed_m_s: float | None = None, density_kg_m3: float | None = None,
 ) -> Record:  # fmt: skip
     """Read one recording, whatever its format."""
-    from bemt.data.recordings.cfd_options import filled
     from bemt.data.recordings.cfd_run import is_run, of_rotor, run_at
     from bemt.data.recordings.cfd_setup import one_grid, stated_setup
     from bemt.data.recordings.load import import_file
     from bemt.data.recordings.reduce import reduce, reduction
+    from bemt.data.recordings.stated import filled
 
     if imported is None:
         imported = run_at(path, rpm, airspeed_m_s)
@@ -257,7 +257,7 @@ _File = tuple[Any, "Case", dict[str, float | None]]
 def _on_grids(files: Sequence[_File]) -> list[tuple[Any, Case, dict[str, float | None], Dataset | None]]:
     """Files with what was read of each; CFD runs of one condition on several grids are one study, no repeats."""
     from bemt.data.recordings.cfd_run import is_run, run_at
-    from bemt.data.recordings.grid_study import are_grids, together
+    from bemt.data.recordings.grids import are_grids, together
     from bemt.data.recordings.load import import_file
 
     read: dict[int, Dataset] = {}
@@ -348,10 +348,11 @@ def _unknown(only: Sequence[str], option: str = "--only") -> list[Fault]:
 
 def _one_setup(imported: Dataset, path: str) -> None:
     """Refuse a table of several propellers or motors: their points are no one curve."""
+    from bemt.base.tables import few
     from bemt.data.readers.generic_csv import setups
 
     for name, kinds in setups(imported.texts, imported.values).items():
-        got = f"{len(kinds)} set-ups: {', '.join(kinds[:4])}" + (", ..." if len(kinds) > 4 else "")
+        got = f"{len(kinds)} set-ups: {few(kinds)}"
         hint = "Put the rows of each into a separate file"
         heading = imported.headings.get(name, name)
         raise InputError(Fault(path, heading, got, "one propeller with one motor", hint))

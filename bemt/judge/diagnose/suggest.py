@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.base.gaussian.whitening import whitener
 from bemt.base.units import ZERO_CELSIUS, suffixes
-from bemt.data.readers.recording import kept_beside
+from bemt.data.readers.left_open import kept_beside
 from bemt.data.readers.recording_toml import QUANTITIES
 from bemt.data.recordings.shown import options_of
 from bemt.judge.compare.change_document import AIR_OF_BOTH, DAYS, title_of

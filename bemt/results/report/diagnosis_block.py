@@ -10,7 +10,7 @@ from typing import Any
 from bemt.base.page import FIRST, Cell, num, table
 from bemt.base.tables import number_text
 from bemt.data.recordings.audit import Audit
-from bemt.data.recordings.grid_study import LOADS, LoadStudy
+from bemt.data.recordings.grids import LOADS, LoadStudy
 from bemt.results.report.book import CasePage, Diagnosed, Part, Picture, ShownParameter, picture
 from bemt.results.report.plot import COLOURS, DASHES, Plot, Trace, figure
 from bemt.results.sweep.rows import Comparison, Result, Row, State

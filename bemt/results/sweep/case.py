@@ -57,7 +57,7 @@ def _runs(case: Case) -> list[tuple[str, Dataset]]:
     """CFD runs of a case; those of one condition on several grids as one study."""
     if not case.run_paths:
         return []
-    from bemt.data.recordings.grid_study import merged
+    from bemt.data.recordings.grids import merged
     from bemt.data.recordings.load import import_file
 
     return [(d.file, d) for d in merged([import_file(path) for path in case.run_paths])]

@@ -28,7 +28,7 @@ from bemt.base.tables import number_of
 from bemt.data.readers.recording import FULL_THROTTLE
 from bemt.data.recordings import plateaus
 from bemt.data.recordings.channels import THROTTLE_IS_PULSE, named, pulse_of
-from bemt.data.recordings.points import tared
+from bemt.data.recordings.zero import tared
 from bemt.physics.dataset import Dataset, concat
 
 # From a recording to the points of a bench map: pulse width, thrust, rpm, current, power, voltage when steady.

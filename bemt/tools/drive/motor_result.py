@@ -18,6 +18,7 @@ from bemt.base.given import inside
 from bemt.base.tables import csv_text, json_text, number_text, text_table, write_atomic
 from bemt.base.toml import FieldLimits, Table, entry, read_model
 from bemt.data import readers as importers
+from bemt.data.readers.split import find_delimiter, split_line
 from bemt.physics.dataset import Dataset
 from bemt.tools.drive import motor_constant, outputs
 from bemt.tools.drive import motor_constant as mc
@@ -247,7 +248,9 @@ def _torque(file: Path, table: TorqueTable, winding: str) -> tuple[mc.Line, mc.T
 def read_waveform(path: Path) -> tuple[Array, Array]:
     """Read an oscilloscope's CSV."""
     source = importers.load_text(path)
-    split = [[c.strip().strip('"') for c in re.split(r"[,;\t]", line)] for line in source.lines if line.strip()]
+    lines = [line for line in source.lines if line.strip()]
+    mark = find_delimiter(lines[-5:])
+    split = [split_line(line, mark) for line in lines]
     start = next((i for i, c in enumerate(split) if _pair(c, 0)), None)
     at = 0
     if start is None or any(_pair(c, 3) for c in split[:3]):

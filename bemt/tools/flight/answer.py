@@ -168,8 +168,7 @@ def answer_on(
     moved, turned = shaken(shake, calm), speed_changes(log, healthy)
     changed, days = change_in(log, placed), sessions(log, healthy, stated_days, day)
     mass = _by_healthy(log, found, healthy, healthy_mass_kg)
-    balance: tuple[float, ...] = ()
-    drives: tuple[float, ...] = ()
+    trims: tuple[tuple[float, ...], tuple[float, ...]] = (), ()
     if mine is None:
         judged = _not_flown(log)
     else:
@@ -187,15 +186,20 @@ def answer_on(
         if mass is not None and judged.next.kind == "run" and judged.said.verdict == "none":
             step = "see whether payload and battery explain the mass; a full battery and a hover of 30 s show the rest"
             judged = replace(judged, next=replace(judged.next, text=step))
-        usual = _usual(log)
-        drives = tuple(map(float, np.exp(usual) / np.exp(usual).mean() - 1.0))
-        if placed is not None:
-            balance = tuple(2.0 * float(r) for r in axes_of(placed, log.rotors) @ usual)
+        trims = _trims(log, placed)
     return FlightAnswer(
-        log, found, judged, air, balance, drives, _limited(log), changed, shake, moved,
+        log, found, judged, air, *trims, _limited(log), changed, shake, moved,
         float(np.exp(shake.level - past.mean())) if past.size else float("nan"), turned, inflow(log), mass,
         simulator=simulator_constants(log, found), curve=thrust_curve(log), days=days, demand=_demand(log),
     )  # fmt: skip
+
+
+def _trims(log: FlightLog, placed: Array | None) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Balance of the usual drives about the axes of the layout, and each of them over their mean, less 1."""
+    usual = _usual(log)
+    drives = tuple(map(float, np.exp(usual) / np.exp(usual).mean() - 1.0))
+    axes = () if placed is None else axes_of(placed, log.rotors) @ usual
+    return tuple(2.0 * float(r) for r in axes), drives
 
 
 def _refuse_unlike(

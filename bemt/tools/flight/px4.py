@@ -81,24 +81,17 @@ def _gathered(data: mmap.mmap) -> tuple[bytearray, dict[int, _Messages], bool]:
                 marked, cut = mark >= 0, kind in _KINDS
                 damaged, at = damaged or not cut, mark + len(_SYNC) if marked else stop if cut else at + 1
                 continue
-            if kind == _DATA:
-                topic = topics.get(number)
-                if topic is not None:
-                    if size == topic.size:
-                        topic.begun += data[at + 5 : after]
-                        if len(topic.begun) >= topic.full:
-                            topic.keep()
-                    elif topic.size or size < 3:
-                        damaged = True
-                    else:
-                        topic.begin(data[at + 5 : after])
-                        head += data[at:after]
-            elif kind == ord("A"):
-                name = data[at + 6 : after].decode("latin-1")
-                if name in _TOPICS:
-                    number = struct.unpack_from("<H", data, at + 4)[0]
-                    topics[number] = _Messages(32 if name == "sensor_accel_fifo" else 1)
-                    head += data[at:after]
+            topic = topics.get(number) if kind == _DATA else None
+            if topic is not None and size == topic.size:
+                topic.add(data[at + 5 : after])
+            elif topic is not None and (topic.size or size < 3):
+                damaged = True
+            elif topic is not None:
+                topic.begin(data[at + 5 : after])
+                head += data[at:after]
+            elif kind == ord("A") and (name := data[at + 6 : after].decode("latin-1")) in _TOPICS:
+                topics[struct.unpack_from("<H", data, at + 4)[0]] = _Messages(32 if name == "sensor_accel_fifo" else 1)
+                head += data[at:after]
             elif kind == ord("B"):
                 head += data[at : at + 3] + bytes(size)  # without the places of appended data
                 places = struct.unpack_from("<3Q", data, at + 19) if size >= 40 else ()
@@ -123,6 +116,12 @@ class _Messages:
         """Take the first message: all of a topic have one length, else they are damaged."""
         self.begun += first
         self.size, self.full = len(first) + 2, _STRETCH // self._each * len(first)
+
+    def add(self, message: bytes) -> None:
+        """Take another message."""
+        self.begun += message
+        if len(self.begun) >= self.full:
+            self.keep()
 
     def keep(self) -> None:
         """Keep a stretch."""

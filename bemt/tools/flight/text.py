@@ -89,26 +89,29 @@ def _constants(a: FlightAnswer) -> list[str]:
 
 def pilot(a: FlightAnswer) -> list[str]:
     """Where to look, what else is certain or how small a damage would show, and the next step."""
-    j, log = a.judged, a.log
-    second = [f"{sensor_text(s)}: look at the sensor. Its readings were repaired." for s in log.sensors]
-    shake = a.vibration
-    if not second and not log.rotors:
-        second = [_level(shake) or "Nothing else in it tells of the motors."]
-    if not second and j.said.verdict == "none" and np.isfinite(j.visible):
-        second = [f"Damage shows here once it changes a rotor's drive by {100 * j.visible:.0f} %."]
-    if not second and j.given and a.days.day == "" and j.said.verdict != "insufficient":
-        second = ["Of the same day as the healthy flights? Say so (--healthy-day): days move the drives by 1 to 3 %."]
-    if not second and (level := _level(shake)):
-        second = [level]
-    if not second and j.given and j.readings.size:
+    return [_look(a), _second(a), f"Next: {a.judged.next.text or 'nothing'}."]
+
+
+def _second(a: FlightAnswer) -> str:
+    """The first of the other things that can be told of a flight."""
+    j, log, level = a.judged, a.log, _level(a.vibration)
+    if log.sensors:
+        return " ".join(f"{sensor_text(s)}: look at the sensor. Its readings were repaired." for s in log.sensors)
+    if not log.rotors:
+        return level or "Nothing else in it tells of the motors."
+    if j.said.verdict == "none" and np.isfinite(j.visible):
+        return f"Damage shows here once it changes a rotor's drive by {100 * j.visible:.0f} %."
+    if j.given and a.days.day == "" and j.said.verdict != "insufficient":
+        return "Of the same day as the healthy flights? Say so (--healthy-day): days move the drives by 1 to 3 %."
+    if level:
+        return level
+    if j.given and j.readings.size:
         order = sorted(range(j.readings.size), key=lambda k: -abs(float(j.readings[k])))[:2]
         most = ", ".join(f"motor {k + 1} {_signed(float(j.readings[k]))}" for k in order)
-        second = [f"Against the mean of all motors, drives changed most from the healthy flights at {most}."]
-    if not second and np.isfinite(j.visible):
-        second = [f"One flight alone shows damage once it changes a rotor's drive by {100 * j.visible:.0f} %."]
-    if not second:
-        second = [f"{headline(j)}: {j.said.why}."]
-    return [_look(a), " ".join(second), f"Next: {j.next.text or 'nothing'}."]
+        return f"Against the mean of all motors, drives changed most from the healthy flights at {most}."
+    if np.isfinite(j.visible):
+        return f"One flight alone shows damage once it changes a rotor's drive by {100 * j.visible:.0f} %."
+    return f"{headline(j)}: {j.said.why}."
 
 
 _SIGNS = {
