@@ -184,6 +184,9 @@ def join(parts: Sequence[tuple[str, Any]], where: str, cut: Sequence[tuple[str, 
     return Mesh(vertices[used], faces.reshape(-1, 3), group, names)
 
 
+_SHORT = 0.03  # of a ray that crosses the whole mesh: 98 % of the places of a blade are thinner
+
+
 def ray_thickness(vertices: Array, faces: Faces, points: Array, outward: Array) -> Array:
     """Length of the way through a closed mesh, straight in from points on its surface. (N,) [m]"""
     solid = as_solid(vertices, faces, "blade")
@@ -191,9 +194,11 @@ def ray_thickness(vertices: Array, faces: Faces, points: Array, outward: Array) 
     skip = 1e-7 * reach
     out = np.full(len(points), math.inf)
     for i, (point, normal) in enumerate(zip(points, outward, strict=True)):
-        hits = solid.ray_cast(point - skip * normal, point - reach * normal)
-        if hits:
-            out[i] = skip + min(hit.distance for hit in hits) * (reach - skip)
+        for far in (_SHORT * reach, reach):  # a short ray meets few facets, and mostly the other side
+            hits = solid.ray_cast(point - skip * normal, point - far * normal)
+            if hits:
+                out[i] = skip + min(hit.distance for hit in hits) * (far - skip)
+                break
     return out
 
 

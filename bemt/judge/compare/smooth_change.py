@@ -12,7 +12,7 @@ of every run), and scatter e of a share and a part of full scale, which is as la
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -77,8 +77,13 @@ def smooth_kernel(c: MatchedChannel, shorter: float = 1.0) -> Array:
 
 def covariance(c: MatchedChannel, s: Scatter) -> Array:
     """Covariance of y where nothing was changed: curve, sessions, zeros, scatter, (N, N)."""
+    return _covariances(c)(s)
+
+
+def _covariances(c: MatchedChannel) -> Callable[[Scatter], Array]:
+    """The same for any scatter: what does not depend on it is worked out once."""
     z = unit_coordinates(c)
-    K = smooth_kernel(c)
+    K, short = smooth_kernel(c), smooth_kernel(c, _LOCAL)
     same, side = (alike(label).astype(float) for label in (c.run, c.second))
     # a coefficient changes little with speed (Reynolds, Mach), anyhow with advance; the drive changes anyhow
     steep = _STEEP**2 if c.name in LOADS else 4.0
@@ -88,9 +93,13 @@ def covariance(c: MatchedChannel, s: Scatter) -> Array:
     level = c.session**2 * (0.7 * side + 0.3 * same + BEND**2 * same * K)
     shift = c.floor * (_ZERO if c.shift is None else np.maximum(c.shift, _ZERO))
     zero = same * np.outer(shift, shift) if c.name in LOADS else 0.0
-    spread = s.share**2 + (s.floor * c.floor) ** 2 + c.u**2
-    local = s.wiggle**2 * same * smooth_kernel(c, _LOCAL) if s.wiggle else 0.0
-    return np.asarray(wide + s.bend**2 * K + level + zero + local + np.diag(spread))
+
+    def of(s: Scatter) -> Array:
+        spread = s.share**2 + (s.floor * c.floor) ** 2 + c.u**2
+        local = s.wiggle**2 * same * short if s.wiggle else 0.0
+        return np.asarray(wide + s.bend**2 * K + level + zero + local + np.diag(spread))
+
+    return of
 
 
 def _level(c: MatchedChannel) -> float:
@@ -127,23 +136,29 @@ def scatter_of(c: MatchedChannel, change: Array | None = None) -> tuple[Scatter,
         "floor": _FLOORS if c.name in LOADS else (0.0,),
     }  # fmt: skip
     best, score = Scatter(0.008, 0.0, 0.0, 0.1), -math.inf
+    of, tried = _covariances(c), set[Scatter]()
     for _ in range(2):
         for name, values in ways.items():
             for value in values:
-                tried = replace(best, **{name: value})
-                z = log_density(covariance(c, tried) + change, y)
+                way = replace(best, **{name: value})
+                if way in tried:
+                    continue
+                tried.add(way)
+                z = log_density(of(way) + change, y)
                 if z > score:
-                    best, score = tried, z
+                    best, score = way, z
     return best, score
 
 
-def without_strays(c: MatchedChannel) -> tuple[MatchedChannel, MatchedChannel]:
-    """Leave out readings that all others contradict (each predicted by the rest); gives these too."""
-    whole, left = c, np.ones(c.y.size, dtype=bool)
+def without_strays(c: MatchedChannel) -> tuple[MatchedChannel, MatchedChannel, tuple[Scatter, float]]:
+    """Leave out readings that all others contradict (each predicted by the rest); gives these too.
+
+    Last the scatter of the others, as of :func:`scatter_of`.
+    """
+    whole, left, found = c, np.ones(c.y.size, dtype=bool), scatter_of(c)
     for _ in range(3):
-        s, _ = scatter_of(c)
         y = c.y - c.y.mean()
-        worst = np.abs(leave_one_out(covariance(c, s) + free_change(c), y)) > _FAR
+        worst = np.abs(leave_one_out(covariance(c, found[0]) + free_change(c), y)) > _FAR
         if not worst.any() or worst.sum() > max(1, 0.1 * y.size) or y.size - worst.sum() < 6:
             break
         keep = ~worst
@@ -151,7 +166,8 @@ def without_strays(c: MatchedChannel) -> tuple[MatchedChannel, MatchedChannel]:
             break
         c = taken(c, keep)
         left[left] = keep
-    return c, taken(whole, ~left)
+        found = scatter_of(c)
+    return c, taken(whole, ~left), found
 
 
 class Ratio(Documented):
@@ -268,8 +284,7 @@ def prepared(a: StandRun, b: StandRun, names: Sequence[str], diameter: float) ->
     for name in names:
         found = matched(a, b, name, diameter)
         if found is not None:
-            channels[name], stray = without_strays(in_common(found))
-            free[name], loose = scatter_of(channels[name])
+            channels[name], stray, (free[name], loose) = without_strays(in_common(found))
             steady[name], stiff = scatter_of(channels[name], steady_change(channels[name]))
             likelier[name] = free[name] if loose > stiff else steady[name]
             if stray.y.size:

@@ -199,14 +199,22 @@ def _shifts(shape: _Shape, solidity: bytes, stagger: bytes) -> tuple[Array, Arra
     i = np.clip(np.floor(x).astype(int) - 1, 0, _LAST[0] - 3)
     j = np.clip(np.floor(y).astype(int) - 1, -_LAST[1], _LAST[1] - 3)
     wx, wy = _cubic(x - i), _cubic(y - j)
-    nodes = {(m, n) for a, b in zip(i, j, strict=True) for m in range(a, a + 4) for n in range(b, b + 4)}
-    found = {node: _node(shape, int(node[0]), int(node[1])) for node in nodes}
-    out = np.zeros((2, x.size))
-    for m in range(4):
-        for n in range(4):
-            value = np.array([found[a + m, b + n] for a, b in zip(i, j, strict=True)]).reshape(-1, 2)
-            out += (wx[m] * wy[n])[None, :] * value.T
+    m, n = np.broadcast_arrays(i[:, None, None] + np.arange(4)[:, None], j[:, None, None] + np.arange(4))
+    own = _solved(shape)
+    new = np.isnan(own[m, n, 0])
+    for node in set(zip(m[new].tolist(), n[new].tolist(), strict=True)):
+        own[node] = _node(shape, *node)
+    value, out = own[m, n], np.zeros((2, x.size))
+    for k in range(4):
+        for at in range(4):
+            out += (wx[k] * wy[at])[None, :] * value[:, k, at].T
     return out[0], out[1]
+
+
+@lru_cache(maxsize=256)
+def _solved(shape: _Shape) -> Array:
+    """Values of :func:`_node` at its two numbers, negative ones from the end; NaN where nobody asked yet."""
+    return np.full((_LAST[0] + 1, 2 * _LAST[1] + 1, 2), np.nan)
 
 
 def _cubic(t: Array) -> Array:
