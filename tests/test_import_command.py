@@ -396,3 +396,28 @@ def test_the_next_step_is_one_that_goes_on(
         Path("b.csv").write_text("\n".join([head, *rows[1:], ""]), encoding="utf-8")
         assert main(["compare", "a.csv", "b.csv"]) == 2
         assert "a.csv: got no load and no speed" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("told", "asked"),
+    [
+        ("--unit thrust=g", "Schub=gf --unit Drehzahl=UNIT"),
+        ("--unit Schub=g --sign thrust=-1 --density-kg-m3 1.2", "Schub=gf --sign thrust=-1 --unit Drehzahl=UNIT"),
+        ("--unit Schub=g --out kept.toml", "Schub=gf --unit Drehzahl=UNIT"),
+    ],
+)
+def test_the_next_step_repeats_what_was_stated(
+    told: str, asked: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The file that the step writes knows all of it: unit of the thrust, sign, density."""
+    monkeypatch.chdir(tmp_path)
+    rows = "".join(f"{10 * k};{12 * k * k};{1000 * k}\n" for k in range(3, 11))
+    Path("a.csv").write_text(f"Gas;Schub;Drehzahl\n{rows}", encoding="utf-8")
+    assert main(["import", "a.csv", *told.split()]) == 0
+    said = capsys.readouterr().out
+    (step,) = [line[line.index("bemt import") :] for line in said.splitlines() if "=UNIT" in line]
+    assert f"--unit {asked} --out " in step and ("--density-kg-m3 1.2" in step) == ("density" in told)
+    assert main(shlex.split(step.partition("   (")[0].replace("UNIT", "rpm"))[1:]) == 0
+    got = import_file(shlex.split(step)[shlex.split(step).index("--out") + 1])
+    sign = -1.0 if "sign" in told else 1.0
+    assert np.allclose(got["thrust_N"], sign * 12e-3 * 9.80665 * np.arange(3, 11) ** 2) and got["rpm"][-1] == 10000.0

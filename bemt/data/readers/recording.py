@@ -86,6 +86,7 @@ class Builder:
     words: list[str] = field(default_factory=list)
     clocks: list[str] = field(default_factory=list)
     units_stated: set[str] = field(default_factory=set)
+    stated: list[str] | None = field(default_factory=list)  # Options of what is stated; None: options cannot say it
     asks: list[str] = field(default_factory=list)
     asked: dict[str, str] = field(default_factory=dict)  # Channel that may be it, by quantity
     decimal: str = "."  # As `decimal_mark` gives it
@@ -366,9 +367,9 @@ class Builder:
             self.warnings.append(f"no unit known, none assumed, for {some(self.unitless, 8)}. {hint}")
         said = {**self.table.source.about, "declared": self.declared, "asked": self.asked, **(provenance or {})}
         asked = _asked(self.unitless, self.channels)
-        if asks := [*self.asks, *asked.values()]:
-            file = Path(self.table.source.name)
-            step = f"bemt import {shlex.quote(file.as_posix())} {' '.join(asks)} --out {kept_beside([file])[0]}"
+        if self.stated is not None and (asks := [*self.asks, *asked.values()]):
+            file, words = Path(self.table.source.name), " ".join([*self.stated, *asks])
+            step = f"bemt import {shlex.quote(file.as_posix())} {words} --out {kept_beside([file])[0]}"
             own = [f"your {what} in place of {mark}" for mark, what in _OWN.items() if mark in step]
             self.warnings.append(f"in one step, with {' and '.join(own)}: {step}" if own else step)
             if self.asks or _NEEDED & asked.keys():
