@@ -346,6 +346,16 @@ def test_a_case_is_called_as_the_user_called_it(here: Path, capsys: pytest.Captu
         bemt.diagnose("blade.csv", "her12x6")
 
 
+def test_a_folder_that_is_not_there_is_no_label(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What begins as `new` calls its folders is a folder: one's own, changed by hand, is not passed over in silence."""
+    assert main(["new", "5x4.3x3"]) == 0 and (here / "prop_5x4.3x3_fpv").is_dir()
+    assert main(["export", "prop_5x4.3x3", "--out", "out"]) == 2
+    assert "no folder or case of this name" in (said := capsys.readouterr().err)
+    assert "a label: 5x4.3x3. Meant prop_5x4.3x3_fpv?" in said
+    with pytest.raises(InputError, match="prop_10x5: got no folder or case of this name; expected a case, or a label"):
+        bemt.import_("blade.csv", case="prop_10x5")
+
+
 @pytest.mark.parametrize("head", ["r/R,chord mm,angle deg", "r_over_R,chord_mm,angle_deg", "r/R,c [mm],Angle (deg)"])
 def test_the_one_angle_of_a_blade_is_its_blade_angle(head: str, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (here / "b.csv").write_text(f"{head}\n0.2,24,33\n0.5,29,17.5\n0.75,22,12\n0.97,11,9\n")

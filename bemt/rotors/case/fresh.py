@@ -85,10 +85,10 @@ def looks_like_label(text: str) -> bool:
 
 
 def own_name(text: str) -> str:
-    """Size in a name that somebody gave a case, such as ``my12x6``: a word that no maker has is glued to it; else "".
+    """Size in a name that somebody or `case_name` gave a case: a word that no maker has is glued to it; else "".
 
     >>> [own_name(t) for t in ("my12x6", "b_12x6", "12x6", "my 12x6", "APC12x6", "HQ5x4.3x3", "prop_12x6")]
-    ['12x6', '12x6', '', '', '', '', '']
+    ['12x6', '12x6', '', '', '', '', '12x6']
     """
     glued = re.fullmatch(r"([A-Za-z]+)[_-]?(\d.*)", text.strip())
     if not glued or not _LABEL.search(glued[2]) or glued[1].casefold() in _MAKERS or blade_class(glued[1]):
@@ -422,7 +422,8 @@ def of_stations(file: Path, diameter_m: float) -> tuple[float, str, BladeStation
     return float(np.clip(found.r_R.min(), 0.05, 0.3)), key, found
 
 
-_MAKERS = {"prop", "t", "q", *FAMILIES, *(word.casefold() for name in FAMILIES.values() for word in name.split())}
+_MAKERS = {"t", "q", *FAMILIES, *(word.casefold() for name in FAMILIES.values() for word in name.split())} - {"prop"}
+"""Words of labels; the one that names of new cases begin with is none."""
 _LABEL = re.compile(r"\d\s*[xX\u00d7*]\s*\d")
 
 
