@@ -368,8 +368,8 @@ class Builder:
         said = {**self.table.source.about, "declared": self.declared, "asked": self.asked, **(provenance or {})}
         asked = _asked(self.unitless, self.channels)
         if self.stated is not None and (asks := [*self.asks, *asked.values()]):
-            file, words = Path(self.table.source.name), " ".join([*self.stated, *asks])
-            step = f"bemt import {shlex.quote(file.as_posix())} {words} --out {kept_beside([file])[0]}"
+            file, options = Path(self.table.source.name), " ".join([*self.stated, *asks])
+            step = f"bemt import {shlex.quote(file.as_posix())} {options} --out {kept_beside([file])[0]}"
             own = [f"your {what} in place of {mark}" for mark, what in _OWN.items() if mark in step]
             self.warnings.append(f"in one step, with {' and '.join(own)}: {step}" if own else step)
             if self.asks or _NEEDED & asked.keys():
