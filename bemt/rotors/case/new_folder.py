@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bemt.base.errors import Fault, InputError, refuse
+from bemt.base.errors import Fault, InputError, installs, refuse
 from bemt.base.packed import part_of
 from bemt.base.tables import write_atomic
 from bemt.base.units import INCH
@@ -19,6 +19,7 @@ from bemt.data.readers import load_text
 from bemt.data.readers.split import decimal_mark, split_table
 from bemt.data.readers.stations import column_of
 from bemt.data.readers.uiuc_names import find_family
+from bemt.physics.sections.neuralfoil import to_install
 from bemt.rotors.case import Case, fresh, from_solid, load_case
 from bemt.rotors.case.motor import full_speed
 
@@ -114,6 +115,8 @@ def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str], list
         read = fresh.read_as(str(wanted.label), given.diameter_in, given.pitch_in)
         notes += [read] if read != wanted.label else []
     kind = [line for line in [fresh.open_kind(str(wanted.label), wanted.blades)] if line] if bare else []
+    if not case.file.polars and to_install([s for _, s in case.rotor().blade.anchors], case.file.model.n_crit):
+        notes.append(f"its sections are not in the shipped table: first {installs('neuralfoil')}")
     return folder, sorted(files), [*assumed, *kind, *notes, *unused]
 
 
