@@ -384,3 +384,13 @@ def test_a_blade_without_an_angle_is_told_what_was_understood(here: Path, capsys
     (here / "b.csv").write_text("Radius [mm];Sehne [mm];Wnkl [Grad]\n20;24;33\n50;29;17\n")
     assert main(["new", "mine", "--stations", "b.csv", "--diameter-mm", "110"]) == 2
     assert "Understood: 'Radius [mm]' as r, 'Sehne [mm]' as chord" in capsys.readouterr().err
+
+
+def test_two_cases_that_new_wrote_can_be_swept_together(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A case that nobody calls by a name has that of the folder it was asked for; one that is called keeps its own."""
+    for words in ((), ("--out", "edf12", "--blades", "12")):
+        assert main(["new", "70mm", "--fan", *words]) == 0
+    assert [load_case(here / name).name for name in ("fan_70", "edf12")] == ["fan_70", "edf12"]
+    for label in ("10x5", "my10x5"):
+        assert main(["new", label, "--out", f"for_{label}"]) == 0
+    assert [load_case(here / name).name for name in ("for_10x5", "for_my10x5")] == ["for_10x5", "my10x5"]

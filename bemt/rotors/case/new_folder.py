@@ -44,6 +44,7 @@ class Wanted:
     reading: str | None = None
     inches: bool = False  # The diameter was given so
     name: str = ""  # Of the case, where it is given beside the label
+    folder: str = ""  # To write, where it is told: a case that nobody calls by a name has that of its folder
 
     @property
     def motor(self) -> tuple[float, int] | None:
@@ -78,6 +79,7 @@ def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str], list
     Gives folder and files; what was assumed of a fan, was not used of the stations, or why a reading may not be this
     rotor's.
     """
+    wanted = replace(wanted, folder=Path(out).resolve().name if out else "")
     faults = _faults(wanted)
     refuse(faults)
     files = _files(wanted)
@@ -274,7 +276,8 @@ def _called(w: Wanted, text: str) -> str:
     """Case file with the name that the user gave it."""
     given = w.label or ""
     sized = w.fan and w.diameter_mm is not None
-    name = fresh.case_name(w.name or given) if w.name or (given and (sized or fresh.own_name(given))) else ""
+    called = w.name or (given if sized or fresh.own_name(given) else w.folder)
+    name = fresh.case_name(called) if called else ""
     return re.sub(r'^name = ".*"$', f'name = "{name}"', text, count=1, flags=re.M) if name else text
 
 
