@@ -386,11 +386,10 @@ def test_a_blade_without_an_angle_is_told_what_was_understood(here: Path, capsys
     assert "Understood: 'Radius [mm]' as r, 'Sehne [mm]' as chord" in capsys.readouterr().err
 
 
-def test_two_cases_that_new_wrote_can_be_swept_together(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A case that nobody calls by a name has that of the folder it was asked for; one that is called keeps its own."""
+def test_two_fans_that_new_wrote_can_be_swept_together(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A fan that nobody calls by a name has that of its folder; the name of a propeller says its size, as a check."""
     for words in ((), ("--out", "edf12", "--blades", "12")):
         assert main(["new", "70mm", "--fan", *words]) == 0
-    assert [load_case(here / name).name for name in ("fan_70", "edf12")] == ["fan_70", "edf12"]
-    for label in ("10x5", "my10x5"):
-        assert main(["new", label, "--out", f"for_{label}"]) == 0
-    assert [load_case(here / name).name for name in ("for_10x5", "for_my10x5")] == ["for_10x5", "my10x5"]
+    assert main(["new", "EDF", "--fan", "--diameter-mm", "70", "--out", "mine"]) == 0
+    assert [load_case(here / name).name for name in ("fan_70", "edf12", "mine")] == ["fan_70", "edf12", "EDF"]
+    assert main(["new", "10x5", "--out", "ten"]) == 0 and load_case(here / "ten").name == "prop_10x5"

@@ -219,7 +219,7 @@ class Builder:
             words = some((f"{cell!r} at {self.line(i)}:{index + 1}" for i, cell in cells), 3)
             self.flag(bad, f"{name}: no number", f": {words}; NaN there")
         if head.told:
-            self.warnings.append(head.told)
+            self.warnings.append(Remark(head.told))
         if head.unit is None:
             running = not head.text and np.array_equal(values, values[0] + np.arange(len(values)))  # as pandas writes
             if not (running or CELLS.search(label.partition("[")[0].strip())):  # a count needs none

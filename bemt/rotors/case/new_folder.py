@@ -44,7 +44,7 @@ class Wanted:
     reading: str | None = None
     inches: bool = False  # The diameter was given so
     name: str = ""  # Of the case, where it is given beside the label
-    folder: str = ""  # To write, where it is told: a case that nobody calls by a name has that of its folder
+    folder: str = ""  # To write, where it is told: a fan that nobody calls by a name has that of its folder
 
     @property
     def motor(self) -> tuple[float, int] | None:
@@ -276,7 +276,7 @@ def _called(w: Wanted, text: str) -> str:
     """Case file with the name that the user gave it."""
     given = w.label or ""
     sized = w.fan and w.diameter_mm is not None
-    called = w.name or (given if sized or fresh.own_name(given) else w.folder)
+    called = w.name or (given if sized or fresh.own_name(given) else w.folder if w.fan else "")
     name = fresh.case_name(called) if called else ""
     return re.sub(r'^name = ".*"$', f'name = "{name}"', text, count=1, flags=re.M) if name else text
 
