@@ -186,7 +186,7 @@ def test_a_reading_of_another_rotor_is_refused(
     said = capsys.readouterr()
     assert "within a factor of 3" in said.err and not said.out
     assert "taken for N" not in said.err, "grams were typed"
-    assert ("1 digit too many in the thrust?" in said.err) == ("4000" in reading)
+    assert ("1 digit too many in the thrust?" in said.err) == ("thrust_g=4000" in reading)
     assert not (tmp_path / "case").exists()
 
 
