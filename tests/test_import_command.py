@@ -421,3 +421,20 @@ def test_the_next_step_repeats_what_was_stated(
     got = import_file(shlex.split(step)[shlex.split(step).index("--out") + 1])
     sign = -1.0 if "sign" in told else 1.0
     assert np.allclose(got["thrust_N"], sign * 12e-3 * 9.80665 * np.arange(3, 11) ** 2) and got["rpm"][-1] == 10000.0
+
+
+@pytest.mark.parametrize("heading", ["scale grams", "Scale (g)", "Waage [g]"])
+def test_a_kitchen_scale_is_a_thrust_and_without_a_speed_what_works_is_named(
+    heading: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = "".join(f"{10 * k},{15 * k},{12 * k * k}\n" for k in range(2, 9))
+    file = tmp_path / "kitchen.csv"
+    file.write_text(f"throttle %,watts,{heading}\n{rows}", encoding="utf-8")
+    assert np.allclose(import_file(file)["thrust_N"], 12e-3 * 9.80665 * np.arange(2, 9) ** 2)
+    assert main(["diagnose", str(file), "--case", "10x5"]) == 2
+    assert "`bemt compare A B` of two runs, at equal power" in capsys.readouterr().err
+
+
+def test_a_measured_propeller_is_said_to_be_fitted_to_its_measurement(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["estimate", "APC 10x5E", "--rpm", "6000"]) == 0
+    assert "fitted to its measurement in the UIUC" in capsys.readouterr().out
