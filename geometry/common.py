@@ -43,6 +43,10 @@ class GeometryError(ValueError):
         return (type(self), (self.faults,))
 
 
+class LibraryError(GeometryError):
+    """A library that an extra brings is not installed: no fault of the geometry."""
+
+
 def needs(module: str, extra: str) -> Any:
     """Import a library that an extra brings, or say which extra is missing."""
     try:
@@ -52,7 +56,7 @@ def needs(module: str, extra: str) -> Any:
         if error.name is None or not module.startswith(error.name):
             raise
         hint = f'Install it with python -m pip install "bemt[{extra}]"'
-        raise GeometryError([(module, "no such library", f"the extra [{extra}]", hint)]) from error
+        raise LibraryError([(module, "no such library", f"the extra [{extra}]", hint)]) from error
 
 
 @contextmanager

@@ -385,8 +385,13 @@ def test_without_an_explanation_the_first_sentence_is_what_the_recording_shows(c
     assert answer.decision.verdict in ("unknown", "insufficient")
     first, second = [line for line in document.explanation(answer) if not line.startswith("Model: ")][1:3]
     word = {"thrust_N": "Thrust", "torque_Nm": "Torque"}[channel]
-    told = re.match(rf"{word} is high by (\d+\.\d) .*%, at tip Mach number (\d\.\d+) to (\d\.\d+)\.$", first)
+    told = re.match(
+        rf"{word} is high by (\d+\.\d) .*%, at tip Mach number (\d\.\d+) to (\d\.\d+) \((\d+) to (\d+) rev/min\)\.$",
+        first,
+    )
     assert told is not None, first
+    low, high, slow, fast = map(float, told.groups()[1:])
+    assert fast == pytest.approx(np.max(series["rpm"]), rel=0.01) and fast / slow == pytest.approx(high / low, rel=0.05)
     assert float(told[1]) == pytest.approx(15.0, abs=1.5), "a share of the load itself, as the headline says it"
     assert (float(told[2]), float(told[3])) == pytest.approx((0.41, 0.69), abs=0.1)
     where = answer.where
@@ -634,3 +639,12 @@ def test_pole_pairs_are_stated_where_a_recording_is_read(tmp_path: Path, capsys:
     export.write_text('"lift-rfile"\n"Iteration" "lift"\n("Iteration" "lift")\n1 2.5\n2 2.6\n3 2.6\n')
     with pytest.raises(InputError, match="tables of measurements"):
         bemt.diagnose(export, "10x5", pole_pairs=7, figures=False)
+
+
+@pytest.mark.parametrize("head", ["rpm,thrust (N),V (V),A (A)", "rpm,thrust (N),torque (Nm),A (A)"])
+def test_power_that_is_not_used_is_said_to_be_left_out(head: str, tmp_path: Path) -> None:
+    """Volts and amperes beside a thrust alone say nothing of the rotor before a run of the same motor does."""
+    rows = [(n, 6.6e-8 * n**2, 9e-10 * n**2 if "torque" in head else 15.0, 1e-3 * n) for n in range(6000, 14000, 1000)]
+    (tmp_path / "a.csv").write_text(head + "\n" + "".join(",".join(f"{v:.5g}" for v in r) + "\n" for r in rows))
+    said = bemt.diagnose(tmp_path / "a.csv", "8x5").text
+    assert ("electrical power is left out" in said) == ("torque" not in head)

@@ -38,6 +38,7 @@ def bemt(env: dict[str, str], cwd: Path, *words: str) -> subprocess.CompletedPro
     ("words", "extra"),
     [
         (("export", "cases/prop_8x5", "--out", "o", "--format", "step"), "cad"),
+        (("export", "cases/prop_8x5", "--out", "o", "--format", "stl", "--printable"), "cad"),
         (("stations", "lump.stl", "--unit", "mm"), "cad"),
         (("sweep", "cases/prop_8x5", "--engine", "dask"), "dask"),
     ],
@@ -50,6 +51,7 @@ def test_a_missing_extra_is_named_with_the_line_that_installs_it(
     done = bemt(bare, tmp_path, *words)
     assert done.returncode == 2, done.stderr
     assert f"bemt[{extra}]" in done.stderr and "pip install" in done.stderr
+    assert "case.toml: " not in done.stderr and "--manifold3d" not in done.stderr, "no fault of the case"
     assert not (tmp_path / "o" / "manifest.json").exists()
 
 

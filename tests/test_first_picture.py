@@ -48,6 +48,7 @@ def test_a_reading_counts_as_inside_exactly_where_the_band_is(
         inside, total, median = view.inside(channel)
         assert (inside, total) == (round(share * n.size), n.size)
         assert np.sign(round(median, 9)) == np.sign(shift)
+    assert view.sentence.endswith("they are 0 % and 0 % from the model.") == (not shift), view.sentence
     # the drawn band covers the points, and holds the model's values where it runs through their conditions
     x = view.curve[view.over]
     own = view.recorded[0][view.over]

@@ -396,3 +396,45 @@ def test_the_next_step_is_one_that_goes_on(
         Path("b.csv").write_text("\n".join([head, *rows[1:], ""]), encoding="utf-8")
         assert main(["compare", "a.csv", "b.csv"]) == 2
         assert "a.csv: got no load and no speed" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("told", "asked"),
+    [
+        ("--unit thrust=g", "Schub=gf --unit Drehzahl=UNIT"),
+        ("--unit Schub=g --sign thrust=-1 --density-kg-m3 1.2", "Schub=gf --sign thrust=-1 --unit Drehzahl=UNIT"),
+        ("--unit Schub=g --out kept.toml", "Schub=gf --unit Drehzahl=UNIT"),
+    ],
+)
+def test_the_next_step_repeats_what_was_stated(
+    told: str, asked: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The file that the step writes knows all of it: unit of the thrust, sign, density."""
+    monkeypatch.chdir(tmp_path)
+    rows = "".join(f"{10 * k};{12 * k * k};{1000 * k}\n" for k in range(3, 11))
+    Path("a.csv").write_text(f"Gas;Schub;Drehzahl\n{rows}", encoding="utf-8")
+    assert main(["import", "a.csv", *told.split()]) == 0
+    said = capsys.readouterr().out
+    (step,) = [line[line.index("bemt import") :] for line in said.splitlines() if "=UNIT" in line]
+    assert f"--unit {asked} --out " in step and ("--density-kg-m3 1.2" in step) == ("density" in told)
+    assert main(shlex.split(step.partition("   (")[0].replace("UNIT", "rpm"))[1:]) == 0
+    got = import_file(shlex.split(step)[shlex.split(step).index("--out") + 1])
+    sign = -1.0 if "sign" in told else 1.0
+    assert np.allclose(got["thrust_N"], sign * 12e-3 * 9.80665 * np.arange(3, 11) ** 2) and got["rpm"][-1] == 10000.0
+
+
+@pytest.mark.parametrize("heading", ["scale grams", "Scale (g)", "Waage [g]"])
+def test_a_kitchen_scale_is_a_thrust_and_without_a_speed_what_works_is_named(
+    heading: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = "".join(f"{10 * k},{15 * k},{12 * k * k}\n" for k in range(2, 9))
+    file = tmp_path / "kitchen.csv"
+    file.write_text(f"throttle %,watts,{heading}\n{rows}", encoding="utf-8")
+    assert np.allclose(import_file(file)["thrust_N"], 12e-3 * 9.80665 * np.arange(2, 9) ** 2)
+    assert main(["diagnose", str(file), "--case", "10x5"]) == 2
+    assert "`bemt compare A B` of two runs, at equal power" in capsys.readouterr().err
+
+
+def test_a_measured_propeller_is_said_to_be_fitted_to_its_measurement(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["estimate", "APC 10x5E", "--rpm", "6000"]) == 0
+    assert "fitted to its measurement in the UIUC" in capsys.readouterr().out

@@ -185,6 +185,8 @@ def test_a_reading_of_another_rotor_is_refused(
     assert cli.main([door, "10x5", *more, "--reading", reading]) == 2
     said = capsys.readouterr()
     assert "within a factor of 3" in said.err and not said.out
+    assert "taken for N" not in said.err, "grams were typed"
+    assert ("1 digit too many in the thrust?" in said.err) == ("thrust_g=4000" in reading)
     assert not (tmp_path / "case").exists()
 
 

@@ -346,10 +346,50 @@ def test_a_case_is_called_as_the_user_called_it(here: Path, capsys: pytest.Captu
         bemt.diagnose("blade.csv", "her12x6")
 
 
-@pytest.mark.parametrize("head", ["r/R,chord mm,angle deg", "r_over_R,chord_mm,angle_deg", "r/R,c [mm],Angle (deg)"])
+def test_a_folder_that_is_not_there_is_no_label(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What begins as `new` calls its folders is a folder: one's own, changed by hand, is not passed over in silence."""
+    assert main(["new", "5x4.3x3"]) == 0 and (here / "prop_5x4.3x3_fpv").is_dir()
+    assert main(["export", "prop_5x4.3x3", "--out", "out"]) == 2
+    assert "no folder or case of this name" in (said := capsys.readouterr().err)
+    assert "a label: 5x4.3x3. Meant prop_5x4.3x3_fpv?" in said
+    with pytest.raises(InputError, match="prop_10x5: got no folder or case of this name; expected a case, or a label"):
+        bemt.import_("blade.csv", case="prop_10x5")
+
+
+@pytest.mark.parametrize("head", ["r/R,chord mm,angle deg", "r_over_R,chord_mm,angle_deg", "r/R,c [mm],Angle (deg)",
+                                  "r/R,Sehne [mm],Winkel [Grad]", "r/R,corda [mm],Angolo (gradi)"])  # fmt: skip
 def test_the_one_angle_of_a_blade_is_its_blade_angle(head: str, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (here / "b.csv").write_text(f"{head}\n0.2,24,33\n0.5,29,17.5\n0.75,22,12\n0.97,11,9\n")
     assert main(["new", "mine", "--stations", "b.csv", "--diameter-in", "12"]) == 0
     assert "read as beta_deg" in capsys.readouterr().out
     assert main(["new", "small", "--stations", "b.csv", "--diameter-mm", "12"]) == 2
     assert "A diameter of 12 mm? 12 in is --diameter-in 12" in capsys.readouterr().err
+
+
+def test_a_blade_that_needs_the_network_is_told_what_to_install(
+    here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A thickness of one's own is no section of the shipped table; without it the base install solves the blade."""
+    monkeypatch.setattr("bemt.base.cache.is_installed", lambda package: package != "neuralfoil")
+    rows = (0.2, 24, 33, 4.8), (0.5, 29, 17.5, 5.2), (0.75, 22, 12, 3.5), (0.97, 11, 9, 1.4)
+    for name, width in (("thick", 4), ("plain", 3)):
+        head = ",".join(("r/R", "chord_mm", "beta_deg", "t_mm")[:width])
+        body = "".join(",".join(map(str, row[:width])) + "\n" for row in rows)
+        (here / f"{name}.csv").write_text(f"{head}\n{body}")
+        assert main(["new", name, "--stations", f"{name}.csv", "--diameter-mm", "254"]) == 0
+        assert ("bemt[neuralfoil]" in capsys.readouterr().out) == (name == "thick")
+
+
+def test_a_blade_without_an_angle_is_told_what_was_understood(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (here / "b.csv").write_text("Radius [mm];Sehne [mm];Wnkl [Grad]\n20;24;33\n50;29;17\n")
+    assert main(["new", "mine", "--stations", "b.csv", "--diameter-mm", "110"]) == 2
+    assert "Understood: 'Radius [mm]' as r, 'Sehne [mm]' as chord" in capsys.readouterr().err
+
+
+def test_two_fans_that_new_wrote_can_be_swept_together(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A fan that nobody calls by a name has that of its folder; the name of a propeller says its size, as a check."""
+    for words in ((), ("--out", "edf12", "--blades", "12")):
+        assert main(["new", "70mm", "--fan", *words]) == 0
+    assert main(["new", "EDF", "--fan", "--diameter-mm", "70", "--out", "mine"]) == 0
+    assert [load_case(here / name).name for name in ("fan_70", "edf12", "mine")] == ["fan_70", "edf12", "EDF"]
+    assert main(["new", "10x5", "--out", "ten"]) == 0 and load_case(here / "ten").name == "prop_10x5"

@@ -166,6 +166,11 @@ def system_fault(error: OSError, file: str = "", expected: str = "a file or fold
     return Fault(place, "", error.strerror or str(error), expected)
 
 
+def installs(extra: str) -> str:
+    """Command that installs an extra of this project."""
+    return f'python -m pip install "bemt[{extra}]"'
+
+
 def needs(module: str, extra: str) -> Any:
     """Import a library that an extra brings, or say which extra is missing.
 
@@ -201,7 +206,7 @@ def needs(module: str, extra: str) -> Any:
     except ModuleNotFoundError as error:
         if error.name is None or not module.startswith(error.name):
             raise
-        hint = f'Install it with python -m pip install "bemt[{extra}]"'
+        hint = f"Install it with {installs(extra)}"
         raise InputError(Fault(module, "", "a library that is not installed", f"the extra [{extra}]", hint)) from error
 
 

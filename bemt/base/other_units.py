@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, MutableMapping, Sequence
 from contextlib import suppress
 from typing import Any
 
-from bemt.base.units import convert, split_suffix
+from bemt.base.units import UNITS, Unit, convert, split_suffix
 
 
 def own_name(name: str, names: Iterable[str]) -> str | None:
@@ -14,13 +14,20 @@ def own_name(name: str, names: Iterable[str]) -> str | None:
 
     >>> own_name("diameter_in", ["rpm", "diameter_m"]), own_name("diameter_kg", ["diameter_m"])
     ('diameter_m', None)
+    >>> own_name("thrust_g", ["thrust_N"])
+    'thrust_N'
     """
     stem, unit = split_suffix(name)
     for own in () if unit is None or name in names else names:
         of, known = split_suffix(own)
-        if of == stem and known is not None and unit is not None and known.dimension == unit.dimension:
+        if of == stem and known is not None and unit is not None and known.dimension == _weight(unit, known).dimension:
             return own
     return None
+
+
+def _weight(unit: Unit, known: Unit) -> Unit:
+    """Unit of mass as the force that it weighs, where a force is meant; any other as it is."""
+    return UNITS.get(f"{unit.suffix}f", unit) if (unit.dimension, known.dimension) == ("mass", "force") else unit
 
 
 def converted(value: Any, name: str, own: str) -> Any:
@@ -28,6 +35,8 @@ def converted(value: Any, name: str, own: str) -> Any:
 
     >>> converted([10, 20], "diameter_in", "diameter_m")
     [0.254, 0.508]
+    >>> round(converted(650, "thrust_g", "thrust_N"), 3)
+    6.374
     """
     unit, to = (split_suffix(word)[1] for word in (name, own))
     assert unit is not None and to is not None
@@ -35,7 +44,7 @@ def converted(value: Any, name: str, own: str) -> Any:
         return value and [converted(one, name, own) for one in value]
     if isinstance(value, str):
         raise TypeError(f"{name}: got {value!r}; expected a number")
-    return convert(value, unit.suffix, to.suffix)
+    return convert(value, _weight(unit, to).suffix, to.suffix)
 
 
 def in_own_units(given: MutableMapping[str, Any], names: Sequence[str]) -> None:

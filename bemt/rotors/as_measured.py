@@ -64,16 +64,22 @@ def _told(times: Mapping[str, float]) -> str:
     return " and ".join(f"{word} {number_text(ratio, 3)} times" for word, ratio in times.items())
 
 
-def _check(where: str, times: Mapping[str, float], far: float) -> None:
-    """Refuse loads that no blade of the case's label has: they would move nothing, as if they agreed."""
+def _check(where: str, times: Mapping[str, float], far: float, typed: bool) -> None:
+    """Refuse loads that no blade of the case's label has: they would move nothing, as if they agreed.
+
+    Numbers that were typed each with its unit slip by a digit, not by the unit.
+    """
     word, ratio = next(iter(times.items()), ("", 1.0))
     if 1.0 / FACTOR < abs(ratio) < FACTOR or far < FAR:
         return
-    slips = [(e.factor, e.rarity, e.words) for e in unit_errors.errors(word.replace("thrust", "force"))]
-    slips += [(r.ratio**-2, r.rarity, f"speed: {r.words}") for r in unit_errors.speed_ratios()]
+    units = unit_errors.errors(word.replace("thrust", "force"))
+    slips = [(e.factor, e.rarity, f"The nearest slip is {e.words}") for e in units if not typed]
+    slips += [(10.0**k, 0.0, f"{abs(k)} digit{'s' * (abs(k) > 1)} too {'many' if k > 0 else 'few'} in the {word}?")
+              for k in (-3, -2, -1, 1, 2, 3) if typed]  # fmt: skip
+    slips += [(r.ratio**-2, r.rarity, f"The nearest slip is speed: {r.words}") for r in unit_errors.speed_ratios()]
     near = min(slips, key=lambda s: (math.log(max(abs(ratio), 1e-12) / s[0]) / 0.25) ** 2 + s[1])
     got, expected = f"{_told(times)} what the case gives", f"loads of this rotor, within a factor of {FACTOR:g}"
-    hint = f"Look at units, speed, diameter and pitch. The nearest slip is {near[2]}"
+    hint = f"Look at {'numbers' if typed else 'units'}, speed, diameter and pitch. {near[2]}"
     raise InputError(Fault(where, "", got, expected, hint))
 
 
@@ -87,13 +93,14 @@ def as_measured(
     case: Case, rpm: Array, airspeed_m_s: Array, air: Air, CT: Array, CP: Array,
     u_CT: Array | float = 0.0, u_CP: Array | float = 0.0, gain: tuple[float, float] = (SESSION, SESSION),
     others: Array | None = None, theirs: NDArray[np.bool_] | None = None,
-    prior: Prior | None = None, where: str | None = None,
+    prior: Prior | None = None, where: str | None = None, typed: bool = False,
 ) -> AsMeasured:  # fmt: skip
     """Posterior of a rotor's latent numbers from a reference run.
 
     ``others`` as in `noise_of_run`, for the points ``theirs`` that another piece or campaign gave, (P,); all of them
     where that is not said.  ``prior``: what is known before, as the case says by default.  ``where`` names readings
-    that are refused, with InputError and before the search, where no blade of the label has such loads.
+    that are refused, with InputError and before the search, where no blade of the label has such loads; ``typed`` says
+    that each of their numbers stands with its unit.
     """
     from bemt.rotors.case.prepare import prepare_case
 
@@ -104,8 +111,8 @@ def as_measured(
     given = content_key(rpm, airspeed_m_s, CT, CP, *map(np.asarray, (u_CT, u_CP, gain)), *fields.values(),
                         *(np.zeros(0) if v is None else v for v in (others, theirs)), prior.known_from,
                         prior.mean, prior.cov, prior.sizes, prior.weights)  # fmt: skip
-    return _MEASURED.get((ready.key, given, where is None, population()), lambda: _searched(
-        ready, prior, rpm, airspeed_m_s, fields, CT, CP, u_CT, u_CP, gain, others, theirs, where,
+    return _MEASURED.get((ready.key, given, where is None, typed, population()), lambda: _searched(
+        ready, prior, rpm, airspeed_m_s, fields, CT, CP, u_CT, u_CP, gain, others, theirs, where, typed,
     ))  # fmt: skip
 
 
@@ -116,7 +123,7 @@ _MEASURED: Kept[AsMeasured] = Kept(64, lambda _: 1.0)
 def _searched(
     ready: Model, prior: Prior, rpm: Array, airspeed_m_s: Array, fields: Mapping[str, Array], CT: Array, CP: Array,
     u_CT: Array | float, u_CP: Array | float, gain: tuple[float, float], others: Array | None,
-    theirs: NDArray[np.bool_] | None, where: str | None,
+    theirs: NDArray[np.bool_] | None, where: str | None, typed: bool,
 ) -> AsMeasured:  # fmt: skip
     """Posterior of :func:`as_measured`."""
     people = population()
@@ -160,7 +167,7 @@ def _searched(
     far = float(np.max(np.abs(_off_by(prior, at, off, noise, mine)), initial=0.0))
     thirst = float(np.max(_off_by(prior, at, off, noise, rows["torque"]), initial=0.0))
     if where is not None:
-        _check(where, times, far)
+        _check(where, times, far, typed)
     z, settled, passes = prior.mean, False, 0
     while passes < MOST_PASSES and not settled:
         passes += 1

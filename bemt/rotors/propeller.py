@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -21,6 +22,7 @@ from bemt.physics.bem.coaxial import LOADS, RATIOS
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case import Case, case_of, find_cases, fresh, load_case
 from bemt.rotors.case.lattice import conditions, turned
+from bemt.rotors.case.load import FILE_NAME
 from bemt.rotors.case.reading import reading_text
 
 if TYPE_CHECKING:
@@ -599,7 +601,9 @@ def rotor_of(given: Propeller | Case | str | os.PathLike[str]) -> Propeller:
     if Path(text).exists() or fresh.is_path(text):
         return load(text)
     if size := fresh.own_name(text):
-        raise InputError(Fault(text, "", "no folder or case of this name", f"a case, or a label: {size}"))
+        near = [case.parent.name for case in Path().glob(f"{glob.escape(text)}*/{FILE_NAME}")]
+        meant = f"Meant {' or '.join(sorted(near)[:3])}?" if near else ""
+        raise InputError(Fault(text, "", "no folder or case of this name", f"a case, or a label: {size}", meant))
     try:
         return propeller(text)
     except InputError as error:

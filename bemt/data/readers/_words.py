@@ -66,6 +66,8 @@ _ABROAD = {  # English: as others write it, without accents, in lower case; a bl
     "blade angle": "einstellwinkel blattwinkel steigungswinkel calage angle~de~calage angle~de~pas angle~de~pale "
     "calettamento angolo~di~calettamento angolo~di~pala angulo~de~paso angulo~de~pala angulo~de~calado 桨叶角 安装角 "
     "kat~nastawienia угол~установки",
+    "scale": "waage kuchenwaage balanza bilancia",
+    "angle": "winkel angolo angulo kat угол hoek 角度",
     "pitch": "steigung pas passo paso",
     "static": "statisch statique estatico estatica statico statica 静态",
     "mean": "mittlerer mittlere mittelwert moyen moyenne medio media 平均 average avg",
@@ -154,6 +156,11 @@ def english(text: str) -> list[str]:
                 at += n
                 break
     return out
+
+
+def in_any_language(word: str) -> re.Pattern[str]:
+    """Pattern of an English word and of what others write for it, in `plain` text."""
+    return re.compile(rf"(?<![^\W_])(?:{'|'.join((word, *_ABROAD[word].split()))})(?![^\W_])")
 
 
 def of_others(quantity: str) -> set[str]:

@@ -53,7 +53,7 @@ USUAL: dict[str, str] = {
 """Usual name of a channel that headings of benches and of CFD name in another way."""
 _THRUSTS = re.compile(
     r"((motor|propeller|prop|rotor|static|max|mean|average|avg|measured|total) )*"
-    r"(thrust|lift|pull|force|load|load ?cell)( (static|force|mean|average|measured))*|t|f"
+    r"(thrust|lift|pull|force|load|load ?cell|scale|balance)( (static|force|mean|average|measured))*|t|f"
 )
 _GOES: dict[str, tuple[str, ...]] = {  # what a suffix may be: T_A is rotor A's thrust, not a current
     "thrust": ("force",), "lift": ("force",), "torque": ("torque",), "power": ("power",), "rpm": ("angular_speed",),
@@ -296,7 +296,7 @@ def heading(text: str) -> Heading:
 def _as_stands_mean(text: str, base: str, stated: str) -> Heading | None:
     """Heading with a unit as stands mean it: a mass for its weight, hertz for turns; None: any other."""
     unit = weighs(stated)
-    if unit and _THRUSTS.fullmatch(plain(base)):
+    if unit and _THRUSTS.fullmatch(" ".join(english(base))):
         told = f"{text!r} is read as {FORCES[unit]}: 1 {stated} weighs {units.UNITS[unit].factor:.4g} N"
         return replace(heading(f"{base} ({unit})"), text=text, told=told)
     if stated in ("Hz", "1/s") and (said := _spoken(base)[1]) & _TURNS and "electrical" not in said:

@@ -76,6 +76,7 @@ class Builder:
     words: list[str] = field(default_factory=list)
     clocks: list[str] = field(default_factory=list)
     units_stated: set[str] = field(default_factory=set)
+    stated: list[str] | None = field(default_factory=list)  # Options of what is stated; None: options cannot say it
     asks: list[str] = field(default_factory=list)
     asked: dict[str, str] = field(default_factory=dict)  # Channel that may be it, by quantity
     decimal: str = "."  # As `decimal_mark` gives it
@@ -201,7 +202,7 @@ class Builder:
             odd = some((f"{self.table.cell(i, index)[:20]!r} at {self.line(i)}:{index + 1}" for i in bad), 3)
             self.flag(bad, f"{name}: no number", f": {odd}; NaN there")
         if head.told:
-            self.warnings.append(head.told)
+            self.warnings.append(Remark(head.told))
         values = self._in_si(name, head, label, values)
         if head.name != name:
             self.warnings.append(f"column {label!r} has the name of another column: kept as {name}")
@@ -365,8 +366,8 @@ class Builder:
             self.warnings.append(f"no unit known, none assumed, for {some(self.unitless, 8)}. {hint}")
         said = {**self.table.source.about, "declared": self.declared, "asked": self.asked, **(provenance or {})}
         open_units = asked(self.unitless, self.channels)
-        if asks := [*self.asks, *open_units.values()]:
-            step = one_step(Path(self.table.source.name).as_posix(), asks)
+        if self.stated is not None and (asks := [*self.asks, *open_units.values()]):
+            step = one_step(Path(self.table.source.name).as_posix(), [*self.stated, *asks])
             own = " and ".join(f"your {what} in place of {mark}" for mark, what in OWN.items() if mark in step)
             self.warnings.append(f"in one step, with {own}: {step}" if own else step)
             if self.asks or NEEDED & open_units.keys():

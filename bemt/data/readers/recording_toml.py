@@ -7,6 +7,7 @@ in the unit of the column. Columns that are not named keep what their headings s
 from __future__ import annotations
 
 import os
+import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -23,7 +24,7 @@ from bemt.base.toml_text import Collector, load_toml
 from bemt.data.readers import head_text, load_text
 from bemt.data.readers._large import NumberTable, large_table
 from bemt.data.readers.generic_csv import electrical, heads_of, only_ones
-from bemt.data.readers.headings import Heading, known
+from bemt.data.readers.headings import Heading, known, meanings
 from bemt.data.readers.recording import Builder
 from bemt.data.readers.samples import Channel
 from bemt.data.readers.split import SplitTable, decimal_mark, split_table
@@ -208,6 +209,23 @@ class RecordingToml(Table):
         if not (said or any(p.given() for p in (self.columns, self.rotor, self.air, self.stand))):
             yield "columns", "a table without channels", "a table with one channel or more, [air], [rotor] or [stand]"
 
+    def options(self) -> list[str] | None:
+        """Options of ``bemt import`` that state the same; None where no option says all of it."""
+        head, rotor, air = self.recording.given(), self.rotor.given(), self.air.given()
+        said = {**head, **rotor, **air}
+        known = {"file", "decimal", "ignore", "rpm", "airspeed_m_s", "pole_pairs", "density_kg_m3"}
+        columns = self.columns.given()
+        plain = all({*c.given()} <= {"column", "unit", "sign"} for c in columns.values())
+        if not (plain and known >= said.keys()) or self.stand.given() or len(self.recording.files) > 1:
+            return None
+        told: dict[str, Sequence[object]] = {"ignore": self.recording.ignore}
+        own = {q: meanings(str(c.column)) == [q] for q, c in columns.items()}  # the heading says which quantity
+        told["column"] = [f"{q}={c.column}" for q, c in columns.items() if not own[q]]
+        told["unit"] = [f"{c.column if own[q] else q}={c.unit}" for q, c in columns.items()]
+        told["sign"] = [f"{q}={c.sign}" for q, c in columns.items() if c.sign != 1]
+        told |= {name.replace("_", "-"): [said[name]] for name in said.keys() & known - {"file", "decimal", "ignore"}}
+        return [f"--{name} {shlex.quote(str(v))}" for name, values in told.items() for v in values]
+
 
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a text has the tables of a recording.toml. [recording]
@@ -324,7 +342,7 @@ def _run(file: str, path: Path, made: RecordingToml) -> Dataset:
     width, places = table.width, _places(file, table, columns)
     stated = "decimal" in head.model_fields_set
     decimal = decimal_mark(table) if isinstance(table, SplitTable) and not stated else head.decimal
-    build = Builder(table, KIND, decimal=decimal)
+    build = Builder(table, KIND, decimal=decimal, stated=made.options())
     heads = heads_of(table)
     known = f"one of {some((repr(h) for h in table.headings if h), 12)}"
     refuse(Fault(file, "recording.ignore", repr(h), known) for h in head.ignore if h not in table.headings)

@@ -15,7 +15,7 @@ from bemt.base import units
 from bemt.base.arrays import Array
 from bemt.base.tables import number_of
 from bemt.data.readers import SourceText, load_text, number
-from bemt.data.readers._words import english, plain
+from bemt.data.readers._words import english, in_any_language, plain
 from bemt.data.readers.split import SplitTable, decimal_mark, odd_mark, split_table
 from bemt.data.readers.unit_text import splits, unit_for
 
@@ -31,7 +31,7 @@ _HEADS: dict[str, tuple[set[str], set[str]]] = {  # column: its own words, words
     "pitch": ({"pitch", "p"}, {"blade", "local", "geometric", "of"}),
     "thickness": ({"thickness", "t"}, {"blade", "local", "section", "relative", "maximum", "max", "ratio", "of"}),
 }
-_ANGLE = re.compile(r"(?<![a-z])angle(?![a-z])")
+_ANGLE = in_any_language("angle")
 _TIPS = {"r": 1.0, "rtip": 1.0, "r tip": 1.0, "radius": 1.0, "d": 2.0, "diameter": 2.0}
 """What lengths are shares of, in tip radii."""
 _TWIST = "Rename it to beta_deg if it is the angle to the plane of rotation; twist may count from elsewhere"
@@ -122,7 +122,10 @@ def _hint(headings: Sequence[str], lacking: Sequence[str]) -> str:
         return f"Write the units, such as {', '.join(f'{h} (mm)' for h in bare)}; shares of the tip radius are r/R, c/R"
     if all(number(h) is not None for h in headings):
         return _NO_HEADINGS
-    return _TWIST if "beta" in lacking and any("twist" in plain(h).split() for h in headings) else ""
+    if "beta" in lacking and any("twist" in plain(h).split() for h in headings):
+        return _TWIST
+    read = [f"{h!r} as {column.name}" for h in headings if (column := column_of(0, h, 1.0))]
+    return f"Understood: {', '.join(read)}" if read else ""
 
 
 def read_stations(path: Path, R: float) -> BladeStations:

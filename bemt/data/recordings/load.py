@@ -208,7 +208,7 @@ def _stated(
         record = import_file(file)
     record = filled(record, rpm)
     about = {**record.provenance, "stated": file}
-    if pole_pairs or ignore:
+    if (pole_pairs or ignore) and "step" not in about:
         options = options_of({"unit": unit, "column": column, "sign": sign, "ignore": ignore,
                               "pole-pairs": [pole_pairs] if pole_pairs else []})  # fmt: skip
         about["step"] = one_step(file, options)

@@ -299,7 +299,9 @@ class Imported:
     def _next_with_recordings(self, said: Mapping[str, Sequence[str | float]]) -> list[str]:
         """What to do with recordings of loads, if they have the speed; first what states a load that was not read."""
         if steps := [f.step for f in self.files if f.step]:
-            return [f"Next: {steps[0]}\n"]
+            step, *own = steps[0].partition("   (")
+            of_run = options_of({k: v for k, v in said.items() if k in ("rpm", "airspeed-m-s", "density-kg-m3")})
+            return [f"Next: {' '.join([step, *of_run])}{''.join(own)}\n"]
         flips = [{USUAL.get(g.channel, g.channel).rsplit("_", 1)[0] for g in f.findings
                   if g.id == "sign_flipped" and g.severity == "warning"} for f in self.files]  # fmt: skip
         if turned := sorted(set[str]().union(*flips).intersection(*flips)):

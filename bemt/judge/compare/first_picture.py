@@ -83,7 +83,8 @@ class PredictionView:
         if not found:
             return f"{self.case}: the model gives no result at these points."
         counts = " and ".join(f"{n} of {total} {word}" for word, n, total, _ in found)
-        middle = " and ".join(f"{100.0 * m:+.0f} %" for *_, m in found if np.isfinite(m)).replace("-", "\N{MINUS SIGN}")
+        shares = [round(100.0 * m) for *_, m in found if np.isfinite(m)]
+        middle = " and ".join(f"{m:+d} %" if m else "0 %" for m in shares).replace("-", "\N{MINUS SIGN}")
         tail = f"; in the median they are {middle} from the model" if middle else ""
         return f"{counts} readings lie inside the 95 % band of {self.case}{tail}."
 

@@ -55,11 +55,12 @@ class Location:
     mismatch: Array = field(
         repr=False, compare=False, default_factory=lambda: np.empty(0)
     )  # (M,) Of every reading, in its unit; what `size` is the mean of
+    rpm: tuple[float, float] = field(default=(float("nan"),) * 2, compare=False)  # Lowest and highest there [rev/min]
 
     def document(self) -> Mapping[str, object]:
         """Plain values for JSON."""
         return {k: (list(v) if isinstance(v, tuple) else v) for k, v in vars(self).items()
-                if k not in ("mismatch", "ratio")}  # fmt: skip
+                if k not in ("mismatch", "ratio", "rpm")}  # fmt: skip
 
 
 def mismatch(found: Evidence, best: Fit) -> Array:
@@ -110,7 +111,8 @@ def _largest(found: Evidence, d: Array, natural: tuple[str, ...]) -> Location:
     known = (problem.channel == channel) & ~free & (np.abs(problem.f0) > _NEAR_ZERO * problem.largest)
     usual = float(np.median(problem.y[known] / problem.f0[known])) if known.any() else 1.0
     ratio = float(np.median(problem.y[here][inside] / f0)) / usual - 1.0 if loaded else float("nan")
-    return Location(CHANNELS[int(channel)], name, low, high, size, z, ties, ratio, 0.0, d)
+    n = problem.covariates["rpm"][problem.point][here][inside]
+    return Location(CHANNELS[int(channel)], name, low, high, size, z, ties, ratio, 0.0, d, (n.min(), n.max()))
 
 
 def _groups(x: Array) -> NDArray[np.intp]:

@@ -17,7 +17,7 @@ from bemt.judge.diagnose.blade import PLAIN, CalibratedBlade, calibrated, prior_
 from bemt.judge.diagnose.noise import in_time, loading
 from bemt.judge.diagnose.nuisance import nuisances
 from bemt.judge.diagnose.problem import Part, Problem, SpeedCurve
-from bemt.judge.diagnose.record import CHANNELS, Record, concatenated, dense, merged, owners
+from bemt.judge.diagnose.record import CHANNELS, POWER_OPEN, Record, concatenated, dense, merged, owners
 from bemt.physics import coefficients as co
 from bemt.physics.bem import model as bem
 from bemt.physics.effects.base import Effect
@@ -159,6 +159,8 @@ def _with_power(problem: Problem) -> Problem:
     """
     records = [p.record for p in problem.parts]
     known = next((p for p in problem.parts if p.record.reference), None)
+    if known is None and any("electrical_power_W" in r.extra and "torque_Nm" not in r.measured for r in records):
+        return replace(problem, notes=(*problem.notes, POWER_OPEN))
     if known is None or len(problem.parts) != 2 or any(p.instead is not None for p in problem.parts):
         return problem
     needs = {"electrical_power_W", "voltage_V"}

@@ -17,7 +17,7 @@ from bemt.judge.diagnose import other_rotor
 from bemt.judge.diagnose.answer import bare
 from bemt.judge.diagnose.form import nearest
 from bemt.judge.diagnose.posterior import LEAST
-from bemt.judge.diagnose.record import DROPPED, NO_SPEED
+from bemt.judge.diagnose.record import DROPPED, NO_SPEED, POWER_OPEN
 from bemt.judge.diagnose.suggest import LEVEL
 from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation, Size
 from bemt.physics import effects
@@ -124,6 +124,8 @@ def _where(w: Location, words: Mapping[str, str]) -> str:
     told = f"{way} by {100.0 * abs(size):.1f}{spread} %{most}"
     if not most and not _PERCENT[0] < 1.0 + size < _PERCENT[1]:
         told = f"{_share(size)} of what the case gives"
+    if w.variable in ("M_tip", "Re"):
+        both += f" ({' to '.join(dict.fromkeys(f'{n:.0f}' for n in w.rpm))} rev/min)"
     return f"{words[w.channel]} is {told}, at {name} {both}."
 
 
@@ -232,7 +234,7 @@ def explanation(d: Diagnosis) -> list[str]:
     decision, catalogue = d.said, effects.catalogue()
     lines = [headline(d), *(f"{words[:1].upper()}{words[1:]}." for words in d.problem.no_check)]
     off_torque = decision.verdict != "none" and abs(d.problem.level.get("torque_Nm", 0.0)) > LEVEL
-    marks = (NO_SPEED, AS_ELECTRICAL, *([AS_SHAFT] if off_torque else []))
+    marks = (NO_SPEED, AS_ELECTRICAL, POWER_OPEN, *([AS_SHAFT] if off_torque else []))
     lines += [f"Before any physics: {note}." for note in d.problem.notes if any(mark in note for mark in marks)]
     lines += [f"Before any physics: {f}" for f in d.problem.findings[:_FINDINGS]]
     if len(d.problem.findings) > _FINDINGS:
@@ -254,7 +256,7 @@ def explanation(d: Diagnosis) -> list[str]:
     speaks = d.found.probability.get(DOUBT, 0.0) > d.found.prior.get(DOUBT, 1.0)
     likelier = open_ and level and speaks and not doubted
     if likelier or doubted or decision.effects[:1] == (AnotherPropeller.id,):
-        lead = f"The loads are off the case ({off}): are {_stated(d)} its own?" if likelier else ""
+        lead = f"The loads are off the middle of the band ({off}): are {_stated(d)} its own?" if likelier else ""
         near = other_rotor.nearest_rotors(d.problem)
         lines += [told] if (told := " ".join(filter(None, (lead, near and f"Nearest rotors: {near}.")))) else []
     if decision.verdict == "none":
@@ -295,6 +297,7 @@ def _stated(d: Diagnosis) -> str:
     """What a case states of its rotor: of a label the ending, too, which tells the kind of blade."""
     known = [p.as_built for p in d.problem.parts if p.as_built is not None]
     label = bool(known) and all(k.prior.known_from == "label" for k in known)
+    label = label and not any(p.model.ducted for p in d.problem.parts)
     return f"diameter, pitch, blades and ending ({', '.join(OPEN_ENDINGS)})" if label else "diameter, pitch and blades"
 
 

@@ -132,7 +132,10 @@ def _speed_missing(imported: Dataset, path: str) -> None:
     low, high = float(thrust.min()), float(thrust.max())
     if high > _ONE_SPEED * low:
         got = f"no speed of rotation, and thrust from {low:.3g} to {high:.3g} N"
-        hint = "Head the column rpm; `--rpm N` states one speed for all rows"
+        hint = (
+            "Head the column rpm; `--rpm N` states one speed for all rows. With watts and no speed: "
+            "`bemt compare A B` of two runs, at equal power; `bemt drive CASE --kv KV --cells N` beside them"
+        )
         raise InputError(Fault(path, "rpm", got, "the speed of every row", hint))
 
 

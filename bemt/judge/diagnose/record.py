@@ -112,6 +112,7 @@ class Record:
 _AIR = ("rho", "mu", "a_sound", "temperature_K")
 NO_SPEED = "rpm: not recorded"
 """Start of the note of a recording that takes the speed of the case."""
+POWER_OPEN = "electrical power is left out: it needs a run of the same motor and controller, --reference RUN"
 DROPPED = " were dropped"
 """What the note of points that do not count holds."""
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -221,6 +221,11 @@ def tunnel_polar(
 
 RAW_DEG = np.arange(-2 * (RAW_LIMIT_DEG + BLEND_DEG), 2 * (RAW_LIMIT_DEG + BLEND_DEG) + 1) / 2.0
 """Angles of attack at which the network is asked [deg]."""
+
+
+def to_install(sections: Iterable[Airfoil], n_crit: float) -> bool:
+    """Whether the polars of sections need the network, and it is not installed."""
+    return not all(covers(s.four_digit, n_crit) for s in sections) and not cache.is_installed("neuralfoil")
 
 
 def _version() -> str:

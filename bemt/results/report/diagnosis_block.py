@@ -91,7 +91,7 @@ def _solved(result: Result) -> Row | tuple[str, str, str]:
     """BEMT at the point that is shown, or the verdict where there is none."""
     if not result.rows:
         n = len(result.faults)
-        return "fault", "not solved", f"{n} fault{'s' * (n != 1)} in the input; nothing was computed."
+        return "fault", "not solved", f"{n} fault{'s' * (n != 1)}; nothing was computed."
     own = lead(result)
     if own is None or not _finite(own.thrust_N):
         return "fault", "no result", f"BEMT did not converge{_at(own) or ' at the operating point of the case'}."
@@ -102,7 +102,7 @@ def verdict(result: Result) -> tuple[str, str, str]:
     """Say how BEMT and the recordings of a case stand: kind and words of a badge, and sentences.
 
     >>> verdict(Result("mine", faults=("a", "b")))
-    ('fault', 'not solved', '2 faults in the input; nothing was computed.')
+    ('fault', 'not solved', '2 faults; nothing was computed.')
     """
     row = _solved(result)
     if isinstance(row, tuple):

@@ -239,7 +239,7 @@ class RotorEstimate(Dataset):
         read += f": diameter {g.diameter_in:g} in, pitch {g.pitch_in:g} in, {g.blades} blades{kind}"
         notes = ["± 68 and 95 %: the rotor itself; on a stand: what yours may show, ± 68 %"]
         if g.source:
-            notes.append(f"as measured: {g.source}")
+            notes.append(f"fitted to its measurement in the {g.source}")
         if self._open_kind:
             notes.append(f"{self._open_kind}; --details says by how much")
         if g.pitch_in > SWAPPED * g.diameter_in:

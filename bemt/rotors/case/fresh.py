@@ -85,10 +85,10 @@ def looks_like_label(text: str) -> bool:
 
 
 def own_name(text: str) -> str:
-    """Size in a name that somebody gave a case, such as ``my12x6``: a word that no maker has is glued to it; else "".
+    """Size in a name that somebody or `case_name` gave a case: a word that no maker has is glued to it; else "".
 
     >>> [own_name(t) for t in ("my12x6", "b_12x6", "12x6", "my 12x6", "APC12x6", "HQ5x4.3x3", "prop_12x6")]
-    ['12x6', '12x6', '', '', '', '', '']
+    ['12x6', '12x6', '', '', '', '', '12x6']
     """
     glued = re.fullmatch(r"([A-Za-z]+)[_-]?(\d.*)", text.strip())
     if not glued or not _LABEL.search(glued[2]) or glued[1].casefold() in _MAKERS or blade_class(glued[1]):
@@ -148,6 +148,8 @@ def open_kind(label: str, blades: int | None = None) -> str:
 
     >>> open_kind("APC 10x5E"), open_kind("APC 10x5").rpartition(": ")[2]
     ('', 'APC Thin Electric')
+    >>> open_kind("Foobar 10x5").rpartition("; ")[2], "known" in open_kind("10x5")
+    ("of a maker 'Foobar' nothing is known", False)
     """
     told = read_label(label, blades)
     if told.blade_class or class_of(family_of(told.maker, None, told.blades)):
@@ -155,6 +157,8 @@ def open_kind(label: str, blades: int | None = None) -> str:
     same = {FAMILIES.get(one.family, one.family) for one in records().values() if one.has_size(told)}
     kin = sorted({name for name in same if told.maker.casefold() in name.casefold()} or same)
     measured = f"; measured in this size (--series): {', '.join(kin)}" if kin else ""
+    known = any(told.maker.casefold() in name.casefold() for name in (*FAMILIES, *FAMILIES.values()))
+    measured += "" if known else f"; of a maker {told.maker!r} nothing is known"
     return f"no ending ({', '.join(OPEN_ENDINGS)}): the kind of blade is open and changes the answer{measured}"
 
 
@@ -252,7 +256,7 @@ def label_text(
     drag = "" if surface is SURFACE else f"\n[model]\ndrag_level = {surface[1].value:g}\n"
     if known is not None:
         open_, values = (AIR,), (known.chord, known.camber, known.offset_deg)
-        source = f"as measured: {known.source}.\n# The numbers are those of bemt's own fit to it."
+        source = f"fitted to its measurement in the {known.source}."
     return f"""# A {told.size} propeller {source}
 schema = "bemt.case/1"
 name = "{_label_name(told)}"
@@ -422,7 +426,8 @@ def of_stations(file: Path, diameter_m: float) -> tuple[float, str, BladeStation
     return float(np.clip(found.r_R.min(), 0.05, 0.3)), key, found
 
 
-_MAKERS = {"prop", "t", "q", *FAMILIES, *(word.casefold() for name in FAMILIES.values() for word in name.split())}
+_MAKERS = {"t", "q", *FAMILIES, *(word.casefold() for name in FAMILIES.values() for word in name.split())} - {"prop"}
+"""Words of labels; the one that names of new cases begin with is none."""
 _LABEL = re.compile(r"\d\s*[xX\u00d7*]\s*\d")
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bemt.base.errors import Fault, InputError, refuse
+from bemt.base.errors import Fault, InputError, installs, refuse
 from bemt.base.packed import part_of
 from bemt.base.tables import write_atomic
 from bemt.base.units import INCH
@@ -19,6 +19,7 @@ from bemt.data.readers import load_text
 from bemt.data.readers.split import decimal_mark, split_table
 from bemt.data.readers.stations import column_of
 from bemt.data.readers.uiuc_names import find_family
+from bemt.physics.sections.neuralfoil import to_install
 from bemt.rotors.case import Case, fresh, from_solid, load_case
 from bemt.rotors.case.motor import full_speed
 
@@ -43,6 +44,7 @@ class Wanted:
     reading: str | None = None
     inches: bool = False  # The diameter was given so
     name: str = ""  # Of the case, where it is given beside the label
+    folder: str = ""  # To write, where it is told: a fan that nobody calls by a name has that of its folder
 
     @property
     def motor(self) -> tuple[float, int] | None:
@@ -77,6 +79,7 @@ def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str], list
     Gives folder and files; what was assumed of a fan, was not used of the stations, or why a reading may not be this
     rotor's.
     """
+    wanted = replace(wanted, folder=Path(out).resolve().name if out else "")
     faults = _faults(wanted)
     refuse(faults)
     files = _files(wanted)
@@ -114,6 +117,8 @@ def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str], list
         read = fresh.read_as(str(wanted.label), given.diameter_in, given.pitch_in)
         notes += [read] if read != wanted.label else []
     kind = [line for line in [fresh.open_kind(str(wanted.label), wanted.blades)] if line] if bare else []
+    if not case.file.polars and to_install([s for _, s in case.rotor().blade.anchors], case.file.model.n_crit):
+        notes.append(f"its sections are not in the shipped table: first {installs('neuralfoil')}")
     return folder, sorted(files), [*assumed, *kind, *notes, *unused]
 
 
@@ -271,7 +276,8 @@ def _called(w: Wanted, text: str) -> str:
     """Case file with the name that the user gave it."""
     given = w.label or ""
     sized = w.fan and w.diameter_mm is not None
-    name = fresh.case_name(w.name or given) if w.name or (given and (sized or fresh.own_name(given))) else ""
+    called = w.name or (given if sized or fresh.own_name(given) else w.folder if w.fan else "")
+    name = fresh.case_name(called) if called else ""
     return re.sub(r'^name = ".*"$', f'name = "{name}"', text, count=1, flags=re.M) if name else text
 
 

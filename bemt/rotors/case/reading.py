@@ -175,7 +175,7 @@ def conditioned(case: Case, text: str) -> CaseAsBuilt:
     prior = as_built_of(base.file, base.folder, base.rotor(), False, None if known is None else False).prior
     found = as_measured(
         base, rpm, V, Air.from_density(), y[0], y[1], u[0], u[1], others=apart(D), theirs=~mine, prior=prior,
-        where=f"reading {text!r}",
+        where=f"reading {text!r}", typed=True,
     )  # fmt: skip
     known_as = replace(found.posterior, known_from="reference")
     asks = []

@@ -433,7 +433,7 @@ class SolidExport(Export):
     def put(self, job: Job, out: Path) -> Manifest:
         """The files that `geometry.export` makes."""
         from bemt.tools.exports.parts import joined
-        from geometry.common import GeometryError
+        from geometry.common import GeometryError, LibraryError
         from geometry.export import export
 
         found: Manifest = {}
@@ -444,7 +444,9 @@ class SolidExport(Export):
                 told = {} if s.printed is None else {"printed": s.printed.document()}
                 found = joined(found, made | {"name": job.case.name} | told)
         except GeometryError as error:
-            raise InputError([Fault(job.file, *fault) for fault in error.faults]) from error
+            alone = isinstance(error, LibraryError)
+            faults = [Fault(at, "", *rest) if alone else Fault(job.file, at, *rest) for at, *rest in error.faults]
+            raise InputError(faults) from error
         return found
 
     def write(self, job: Job) -> Files:
