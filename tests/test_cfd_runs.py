@@ -588,6 +588,22 @@ def test_what_is_a_unit_or_a_sign_is_no_physics(
     assert words in head and ("agree" in head) == (not words)
 
 
+def test_a_fan_whose_run_does_not_split_its_thrust_keeps_the_limits_of_a_fan(
+    put: Callable[..., Path], project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = [
+        str(put("T.out", rfile("thrust", steady(23.5), None))),
+        str(put("Q.out", rfile("torque", steady(0.285), None))),
+    ]
+    case = ["--case", str(project / "cases" / "ds30")]
+    told = ["--rpm", "55000", "--unit", "thrust=N", "--unit", "torque=N m"]
+    assert main(["import", *files, *told, "--out", "run.toml"]) == 0
+    for command in (["compare", "run.toml"], ["import", "run.toml"], ["diagnose", "run.toml"]):
+        capsys.readouterr()
+        main([*command, *case])
+        assert "must be" not in capsys.readouterr().out
+
+
 def test_a_bench_is_no_cfd_and_has_the_u_of_a_stand(put: Callable[..., Path]) -> None:
     from bemt.judge.compare import one_run
 
@@ -713,6 +729,16 @@ def test_a_unit_is_named_only_where_it_was_open_and_fits_every_point() -> None:
     two = _told({"thrust_N": [18.7, 18.7], "torque_Nm": [25.4, 25.4]}, both)
     assert "check the unit" not in two  # a unit of one load leaves the other unexplained
     assert _told({"thrust_N": [4.448, 4.448], "torque_Nm": [1.356 * 12, 1.356 * 12]}, both).count("taken for") <= 1
+
+
+def test_loads_that_are_off_by_one_factor_are_no_unit_of_one_of_them() -> None:
+    """PPTC beside a case of another size, a full model told to be one of seven sectors, rad/s given as rev/min."""
+    both = frozenset({"thrust_N", "torque_Nm"})
+    for thrust, torque, words in ((4.448, 4.3, "diameter"), (7.1, 6.8, "sector"), (1 / 4.4, 1 / 4.6, "density"),
+                                  (88.0, 93.0, "rad/s taken for rev/min")):  # fmt: skip
+        for units_open in (both, frozenset[str]()):
+            told = _told({"thrust_N": [thrust] * 2, "torque_Nm": [torque] * 2}, units_open)
+            assert words in told and "check the unit" not in told and ("then the units" in told) == bool(units_open)
 
 
 def test_coefficients_have_no_unit() -> None:

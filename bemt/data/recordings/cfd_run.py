@@ -446,19 +446,21 @@ def _dataset(work: OpenRun, points: _Points, read: Sequence[tuple[str, Dataset]]
     return with_grid_floor(made, u, (f"u of the grid: {told}, as stated",) if u else ())
 
 
-def _slips(run: CfdRun, diameter_m: float | None = None, density_kg_m3: float | None = None) -> tuple[str, ...]:
+def _slips(
+    run: CfdRun, diameter_m: float | None = None, density_kg_m3: float | None = None, ducted: bool = False
+) -> tuple[str, ...]:  # fmt: skip
     """Slips of a unit that the loads of a run show; what lies elsewhere is none."""
     of_case = {"diameter_m": diameter_m, "density_kg_m3": density_kg_m3}
-    found = () if run.elsewhere else check(run, ducted="duct_thrust_N" in run, **of_case)
+    found = () if run.elsewhere else check(run, ducted=ducted or "duct_thrust_N" in run, **of_case)
     open_ = density_kg_m3 is None and "density_kg_m3" not in run
     fluid = "density, not stated and taken for that of air (--density-kg-m3), or " if open_ else ""
     return tuple(f"{f.evidence}. Suggestion: {fluid}{f.correction}" for f in found if f.severity != "note")
 
 
-def of_rotor(run: CfdRun, diameter_m: float, density_kg_m3: float) -> CfdRun:
+def of_rotor(run: CfdRun, diameter_m: float, density_kg_m3: float, ducted: bool) -> CfdRun:
     """A run of a rotor that is known, in air or water of its case: no slip is seen by a diameter that was guessed."""
     guessed = set(_slips(run))
-    said = _slips(run, diameter_m, density_kg_m3)
+    said = _slips(run, diameter_m, density_kg_m3, ducted)
     return replace(run, notes=(*said, *(note for note in run.notes if note not in guessed)))
 
 

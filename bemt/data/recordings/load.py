@@ -118,11 +118,11 @@ def _unsettled(record: Dataset) -> list[str]:
 def import_files(
     paths: Iterable[str | os.PathLike[str]], format: str | None = None, choice: Choice | None = None,  # noqa: A002
     run: RunToml | None = None, insist: bool = False, stated: Mapping[str, Dataset] = {},  # noqa: B006
-    rotor: tuple[float, float] | None = None,
+    rotor: tuple[float, float, bool] | None = None,
 ) -> Imported:  # fmt: skip
     """Read files, those of `stated` as the user states them; with ``insist`` they must be the CFD run of ``run``.
 
-    `rotor`: diameter [m] and density [kg/m3] of the case, as far as it is known.
+    `rotor`: diameter [m], density [kg/m3] and duct of the case, as far as it is known.
     """
     names = [os.fspath(path) for path in paths]
     runs, to_do = runs_of(names, run, insist)
@@ -283,7 +283,7 @@ def _refusal(error: Exception) -> str:
 
 
 def _file(
-    name: str, format: str | None, record: Dataset | None, error: str | None, rotor: Sequence[float]  # noqa: A002
+    name: str, format: str | None, record: Dataset | None, error: str | None, rotor: Sequence[Any]  # noqa: A002
 ) -> ImportedFile:  # fmt: skip
     if record is None:
         return ImportedFile(name, format, error=error)
@@ -319,10 +319,10 @@ def check_format(name: str | None) -> None:
         raise InputError(Fault("", "--format", repr(name), f"one of {', '.join(importers.importers())}"))
 
 
-def as_dataset(record: Dataset, rotor: Sequence[float] = ()) -> Dataset:
+def as_dataset(record: Dataset, rotor: Sequence[Any] = ()) -> Dataset:
     """Points of what was read: steady points of a recording, rows of a table, else one point of means.
 
-    `rotor`: diameter [m] and density [kg/m3] of the case, where one is known.
+    `rotor`: diameter [m], density [kg/m3] and duct of the case, where one is known.
     """
     if cfd_run.is_run(record):
         return record
