@@ -112,6 +112,8 @@ def test_steady_drift_is_that_of_the_trend_not_of_the_noise() -> None:
     assert abs(steady_average(5.0 + noise).drift or 1.0) < 1e-3
     moving = steady_average(5.0 + noise + 0.001 * np.arange(1000))
     assert moving.drift == pytest.approx(0.2 / 5.9, rel=0.02) and moving.rows == 200
+    turned = steady_average(-5.0 - noise - 0.001 * np.arange(1000))  # grows in size all the same
+    assert (turned.drift, turned.spread) == (moving.drift, moving.spread)
     assert steady_average([]).mean is None and steady_average([1e308, 1e308, -1e308]).mean == pytest.approx(1e308 / 3)
     assert steady_average([1.0, np.nan]).mean is None and steady_average([0.0] * 5).drift is None
 

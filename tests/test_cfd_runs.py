@@ -351,6 +351,10 @@ def test_the_start_up_is_cut_and_a_run_that_moves_says_so(put: Callable[..., Pat
     drift = run.drift["thrust_N"]
     assert drift == pytest.approx(0.059 / 1.27, rel=0.02) and any("not settled: thrust" in n for n in run.notes)
     assert run.u["thrust_N"][0] > drift * T
+    put("against.out", rfile("thrust", -T * (1.0 + 0.001 * k), None))  # the same load along the other axis
+    for columns in (UNITS["columns"], {"thrust": {"unit": "N", "sign": 1}}):
+        other = run_of(["against.out"], {"rpm": RPM}, columns=columns)
+        assert other.drift == run.drift and (other.u["thrust_N"] == run.u["thrust_N"]).all()
     put("thrust.out", rfile("thrust", T * np.exp(-k / 30.0), None))
     with pytest.raises(InputError, match="a run that has converged"):
         run_of(["thrust.out"], {"rpm": RPM}, **UNITS)
@@ -370,6 +374,28 @@ def test_propeller_info_of_openfoam_gives_coefficients(put: Callable[..., Path])
     found = {k: float(v[0]) for k, v in run.values.items()}
     assert found == pytest.approx({"rpm": 1500.0, "airspeed_m_s": 2.5, "CT": 0.2, "CQ": 0.03, "J": 0.5})
     assert run.u["CT"][0] == pytest.approx(grid_floor("CT", True) * 0.2)
+
+
+Y_PLUS = "# y+ ()\n# Time\tpatch\tmin\tmax\taverage\n500\tblade\t5.8\t1392\t92.5\n"
+
+
+def test_y_plus_counts_as_it_is_given_and_cells_above_the_log_layer_are_said(
+    put: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Beside the forces, named with them, or a monitor in the file of the loads: all three say the same of the wall."""
+    foam(put)
+    for name in ("force", "moment"):
+        shutil.copy(f"postProcessing/forces/0/{name}.dat", f"{name}.dat")
+    put("yPlus.dat", Y_PLUS)
+    heads = [f"{w} Monitor: {w}" for w in ("Thrust (N)", "Torque (N-m)", "Wall Y+ Avg", "Wall Y+ Max")]
+    rows = "".join(f"{k},{T},{Q},92.5,1392\n" for k in range(1, 201))
+    put("star.csv", ",".join(f'"{h}"' for h in ("Iteration", *heads)) + "\n" + rows)
+    for files in (["force.dat", "moment.dat"], ["force.dat", "moment.dat", "yPlus.dat"], ["star.csv"]):
+        assert main(["import", *files, "--rpm", f"{RPM}", "--setup", "wall=function", "--out", "run.toml"]) == 0
+        assert "y+ of walls" not in capsys.readouterr().out
+        assert main(["compare", "run.toml", "--case", "10x5"]) == 0
+        said = " ".join(capsys.readouterr().out.split())
+        assert "wall functions, mean y+ 92.5, up to 1392" in said and "above the log layer" in said
 
 
 def test_a_written_run_is_read_back() -> None:

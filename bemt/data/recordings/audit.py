@@ -70,7 +70,9 @@ class CfdFacts:
     cells: float = math.nan  # Cells of the grid [1]
     drift: float = math.nan  # Change of the thrust over the averaged iterations or revolutions, relative [1]
     wall: str = ""  # ``function``, ``scalable``, ``automatic``, ``resolved`` or empty
-    y_plus: float = math.nan  # Mean distance of the first cell in wall units [1]
+    # Mean distance of the first cell in wall units, and the largest [1]
+    y_plus: float = math.nan
+    y_plus_max: float = math.nan
     turbulence: str = ""  # Model; empty is not stated
     thrust_from: str = ""  # ``forces``, ``node``, ``momentum`` or empty
     steady_mrf: bool | None = None  # Whether the rotor was frozen in a rotating frame
@@ -172,7 +174,7 @@ def _wall(f: CfdFacts) -> Judged:
     }.get(f.wall, "wall treatment not stated")  # fmt: skip
     if math.isnan(y):
         return "not stated", f"{words}; y+ not stated", "skin friction and stall unknown", math.nan
-    words = f"{words}, mean y+ {y:.3g}"
+    words = f"{words}, mean y+ {y:.3g}" + (f", up to {f.y_plus_max:.4g}" if math.isfinite(f.y_plus_max) else "")
     if not f.wall:
         return "not stated", words, "unknown", math.nan
     if f.wall == "resolved":
@@ -180,6 +182,8 @@ def _wall(f: CfdFacts) -> Judged:
             return "fine", words, "none", 0.0
         return "fault", words, "the sublayer is not resolved", math.nan
     if 30.0 <= y <= 300.0:
+        if f.y_plus_max > 300.0:
+            return "doubtful", words, "first cell above the log layer in places", math.nan
         return "fine", words, "within the log layer", 0.0
     if y > 300.0:
         return "fault", words, "first cell above the log layer", math.nan
@@ -329,6 +333,7 @@ def facts_of(get: Callable[[str], Any], own: bool, **flow: float) -> CfdFacts:
         grids=_whole(get("grids"), 0 if own else None), u_grid=number_or(get("u_grid")), cells=number_or(get("cells")),
         drift=number_or(get("drift_thrust")), wall=str(get("wall") or ("function" if own else "")),
         y_plus=number_or(get("y_plus"), number_or(get("yplus_avg"))),
+        y_plus_max=number_or(get("y_plus_max")),
         turbulence=_WALLS.get(str(turbulence), str(turbulence or "")),
         thrust_from="forces" if own else str(get("thrust_from") or ""), steady_mrf=True if own else get("steady"),
         skew_deg=number_or(get("sideslip_deg"), 0.0), mass_balance=number_or(get("balance_mass")),

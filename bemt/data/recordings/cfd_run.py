@@ -33,6 +33,7 @@ from bemt.data.recordings.cfd_files import (
     cfd_files,
     clock_of,
     columns_of,
+    monitored_y_plus,
     other_than_loads,
     read_run,
     settled,
@@ -175,7 +176,8 @@ def _opened(run: RunToml, folder: Path, name: str) -> tuple[OpenRun, list[tuple[
     told = {"restart": False, "joined": False, "left out": False, "rhoInf": bool(run.reference.density_kg_m3),
             "--sector": bool(run.run.sector)}  # fmt: skip
     notes = [n for _, r in read for n in r.notes if any(word in n and not said for word, said in told.items())]
-    return OpenRun(run, name, columns, complete=not faults, notes=notes, faults=faults, walls=walls), read
+    return OpenRun(run, name, columns, complete=not faults, notes=notes, faults=faults,
+                   walls=walls or monitored_y_plus(columns)), read  # fmt: skip
 
 
 def _summed(work: OpenRun, quantity: str) -> dict[str, Settled]:
@@ -323,7 +325,7 @@ def _applied(work: OpenRun, rpm: Array, loads: Mapping[str, Settled]) -> _Points
         size = math.hypot(*(abs(x) for x in (found.drift, found.scatter) if math.isfinite(x)), 0.0)
         points.u[name] = np.broadcast_to(size * times, values[name].shape).copy()
         points.averaged[name] = found.over
-        mean = float(np.nanmean(np.abs(found.values))) if np.isfinite(found.values).any() else math.nan
+        mean = float(np.nanmean(found.values)) if np.isfinite(found.values).any() else math.nan
         if math.isfinite(found.drift) and mean:
             drift = points.drift[name] = found.drift / mean
             if abs(drift) > LOST:
@@ -400,7 +402,8 @@ def _conditions(
         "steady": False if "time" in clocks else True if "iteration" in clocks else None, "thrust_from": "forces",
     }  # fmt: skip
     fine = [v for k, v in work.walls.items() if TURNS.search(k)] or list(work.walls.values())
-    found["y_plus"] = float(np.mean(fine)) if fine else None
+    means, most = ([v for v in column if math.isfinite(v)] for column in zip(*fine, strict=True)) if fine else ([], [])
+    found |= {"y_plus": float(np.mean(means)) if means else None, "y_plus_max": max(most, default=None)}
     more = {"drift_thrust": drift, "u_grid": _stated_grid(work).get("thrust_N")}
     return {k: v for part in (found, work.run.setup.given(), more) for k, v in part.items() if v is not None}
 

@@ -35,7 +35,7 @@ from bemt.data.recordings.adapt import (
     is_recording,
     reduction_of,
 )
-from bemt.data.recordings.cfd_files import PROGRAMS, cfd_files, other_than_loads
+from bemt.data.recordings.cfd_files import PROGRAMS, WALLS, cfd_files, other_than_loads
 from bemt.data.recordings.grid_study import merged, of_table
 from bemt.data.recordings.reduce import reduction
 from bemt.data.recordings.shown import INTERNAL, Imported, ImportedFile, options_of
@@ -127,7 +127,9 @@ def import_files(
     names = [os.fspath(path) for path in paths]
     runs, to_do = runs_of(names, run, insist)
     if runs or to_do:
-        names = [name for name in names if not (Path(name).is_dir() and cfd_files(Path(name)))]
+        whole = {f for d in runs for f in d.files}
+        names = [n for n in names if not (Path(n).is_dir() and cfd_files(Path(n)))
+                 and not (Path(n).name == WALLS and (to_do or n in whole))]  # fmt: skip
     records: dict[str, Dataset] = {}
     errors: dict[str, str] = {}
     for name in names:
@@ -225,7 +227,8 @@ def _study(run: RunToml, insist: bool) -> list[Dataset]:
 def _runs_and_exports(names: Sequence[str], insist: bool) -> tuple[list[Dataset], list[str]]:
     """Which names are a run by themselves, as a run.toml is, and which are exports of CFD programs."""
     runs, exports = [], list[str]()
-    for name in names:
+    walls = [n for n in names if Path(n).name == WALLS]
+    for name in [n for n in names if n not in walls] or names:
         try:
             if Path(name).is_dir() and not (Path(name) / "run.toml").is_file():
                 exports += map(str, cfd_files(Path(name)))
@@ -236,7 +239,7 @@ def _runs_and_exports(names: Sequence[str], insist: bool) -> tuple[list[Dataset]
         except (InputError, OSError):
             if insist:
                 raise
-    return runs, exports
+    return runs, exports + walls if exports else exports
 
 
 def runs_of(
