@@ -367,6 +367,12 @@ def test_a_flow_that_does_not_balance_is_a_fault(mass: float, momentum: float, s
     assert item.status == status and item.u_relative == pytest.approx(u, nan_ok=True)
 
 
+def test_incompressible_flow_at_a_moderate_tip_mach_number_is_no_fault_in_a_duct_either() -> None:
+    low, fast = (line(replace(GOOD, ducted=True, compressible=False, M_tip=M), TOPICS[1]) for M in (0.33, 0.6))
+    assert low.status == "doubtful" and "1.8%" in low.consequence and math.isnan(low.u_relative)
+    assert fast.status == "fault" and "no rule measured for ducted rotors" in fast.consequence
+
+
 def test_drift_and_grid_are_taken_as_they_are() -> None:
     assert line(replace(GOOD, drift=-0.03), TOPICS[3]) == replace(
         line(replace(GOOD, drift=0.03), TOPICS[3]), finding="thrust drifts by -3.00% over the averaged part"

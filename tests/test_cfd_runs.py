@@ -398,6 +398,24 @@ def test_y_plus_counts_as_it_is_given_and_cells_above_the_log_layer_are_said(
         assert "wall functions, mean y+ 92.5, up to 1392" in said and "above the log layer" in said
 
 
+def test_what_an_audit_calls_not_stated_can_be_stated_by_the_key_that_it_names(
+    put: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    foam(put)
+    told = ["postProcessing", "--rpm", f"{RPM}", "--out", "run.toml", "--setup"]
+    assert main(["import", *told, "domian=3"]) == 2 and "domian: an unknown key" in capsys.readouterr().err
+    values = {"domain_over_D": "8", "compressible": "yes", "balance_mass": "0.001", "balance_momentum": "-0.002",
+              "wall": "function", "y_plus": "60", "turbulence": "k-omega SST"}  # fmt: skip
+    assert main(["import", *told, "grids=1"]) == 0
+    capsys.readouterr()
+    open_ = one_run.text(one_run.compare_run("run.toml", "10x5"))
+    assert all(key in open_.partition("--setup KEY=VALUE")[2] for key in values)
+    assert main(["import", *told, "grids=1", *(f"{k}={v}" for k, v in values.items())]) == 0
+    found = one_run.compare_run("run.toml", "10x5")
+    assert not [line.topic for line in found.audit if line.status == "not stated"]
+    assert "--setup KEY=VALUE" not in one_run.text(found)
+
+
 def test_a_written_run_is_read_back() -> None:
     document = {"run": {"files": ("a b.out", "täglich.out"), "rpm": 8000.0, "zones": ("blade:1", "hub")},
                 "columns": {"torque": {"column": 'q"1', "sign": -1}}, "setup": {"steady": False, "cells": 2.5e6}}  # fmt: skip

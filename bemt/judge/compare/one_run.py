@@ -23,7 +23,7 @@ from bemt.base import unit_errors
 from bemt.base.document import Documented
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of, number_text, speed_text, text_table
-from bemt.data.recordings.audit import AuditLine, combined
+from bemt.data.recordings.audit import KEYS, AuditLine, combined
 from bemt.data.recordings.cfd_run import is_run, of_rotor, run_at
 from bemt.data.recordings.cfd_setup import (
     Elsewhere,
@@ -470,6 +470,8 @@ def text(found: RunComparison, details: bool = False) -> str:
         lines.append(f"  averaged: {', '.join(k for k, v in found.averaged.items() if v == over)}: {over}")
     lines += ["", "Audit of the CFD run"] if found.audit else []
     lines += map(_audited, found.audit if details else found.audit[:7])
+    if keys := [KEYS[a.topic] for a in found.audit if a.status == "not stated" and a.topic in KEYS]:
+        lines.append(_filled(f"`bemt import --setup KEY=VALUE` states: {', '.join(keys)}", "  "))
     flags = list(dict.fromkeys(f for p in found.points for f in p.flags))
     said = [f"! {n}" for n in (found.notes if details else found.notes[:4])]
     said += [f"! BEMT: {f}" for f in (flags if details else flags[:2])]
