@@ -112,6 +112,8 @@ def test_steady_drift_is_that_of_the_trend_not_of_the_noise() -> None:
     assert abs(steady_average(5.0 + noise).drift or 1.0) < 1e-3
     moving = steady_average(5.0 + noise + 0.001 * np.arange(1000))
     assert moving.drift == pytest.approx(0.2 / 5.9, rel=0.02) and moving.rows == 200
+    turned = steady_average(-5.0 - noise - 0.001 * np.arange(1000))  # grows in size all the same
+    assert (turned.drift, turned.spread) == (moving.drift, moving.spread)
     assert steady_average([]).mean is None and steady_average([1e308, 1e308, -1e308]).mean == pytest.approx(1e308 / 3)
     assert steady_average([1.0, np.nan]).mean is None and steady_average([0.0] * 5).drift is None
 
@@ -363,6 +365,12 @@ def test_a_frozen_rotor_does_not_see_skewed_inflow(skew: float, steady: bool, st
 def test_a_flow_that_does_not_balance_is_a_fault(mass: float, momentum: float, status: str, u: float) -> None:
     item = line(replace(GOOD, mass_balance=mass, momentum_balance=momentum), TOPICS[4])
     assert item.status == status and item.u_relative == pytest.approx(u, nan_ok=True)
+
+
+def test_incompressible_flow_at_a_moderate_tip_mach_number_is_no_fault_in_a_duct_either() -> None:
+    low, fast = (line(replace(GOOD, ducted=True, compressible=False, M_tip=M), TOPICS[1]) for M in (0.33, 0.6))
+    assert low.status == "doubtful" and "1.8%" in low.consequence and math.isnan(low.u_relative)
+    assert fast.status == "fault" and "no rule measured for ducted rotors" in fast.consequence
 
 
 def test_drift_and_grid_are_taken_as_they_are() -> None:

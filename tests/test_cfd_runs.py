@@ -351,6 +351,10 @@ def test_the_start_up_is_cut_and_a_run_that_moves_says_so(put: Callable[..., Pat
     drift = run.drift["thrust_N"]
     assert drift == pytest.approx(0.059 / 1.27, rel=0.02) and any("not settled: thrust" in n for n in run.notes)
     assert run.u["thrust_N"][0] > drift * T
+    put("against.out", rfile("thrust", -T * (1.0 + 0.001 * k), None))  # the same load along the other axis
+    for columns in (UNITS["columns"], {"thrust": {"unit": "N", "sign": 1}}):
+        other = run_of(["against.out"], {"rpm": RPM}, columns=columns)
+        assert other.drift == run.drift and (other.u["thrust_N"] == run.u["thrust_N"]).all()
     put("thrust.out", rfile("thrust", T * np.exp(-k / 30.0), None))
     with pytest.raises(InputError, match="a run that has converged"):
         run_of(["thrust.out"], {"rpm": RPM}, **UNITS)
@@ -370,6 +374,46 @@ def test_propeller_info_of_openfoam_gives_coefficients(put: Callable[..., Path])
     found = {k: float(v[0]) for k, v in run.values.items()}
     assert found == pytest.approx({"rpm": 1500.0, "airspeed_m_s": 2.5, "CT": 0.2, "CQ": 0.03, "J": 0.5})
     assert run.u["CT"][0] == pytest.approx(grid_floor("CT", True) * 0.2)
+
+
+Y_PLUS = "# y+ ()\n# Time\tpatch\tmin\tmax\taverage\n500\tblade\t5.8\t1392\t92.5\n"
+
+
+def test_y_plus_counts_as_it_is_given_and_cells_above_the_log_layer_are_said(
+    put: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Beside the forces, named with them, or a monitor in the file of the loads: all three say the same of the wall."""
+    foam(put)
+    for name in ("force", "moment"):
+        shutil.copy(f"postProcessing/forces/0/{name}.dat", f"{name}.dat")
+    put("yPlus.dat", Y_PLUS)
+    heads = [f"{w} Monitor: {w}" for w in ("Thrust (N)", "Torque (N-m)", "Wall Y+ Avg", "Wall Y+ Max")]
+    rows = "".join(f"{k},{T},{Q},92.5,1392\n" for k in range(1, 201))
+    put("star.csv", ",".join(f'"{h}"' for h in ("Iteration", *heads)) + "\n" + rows)
+    for files in (["force.dat", "moment.dat"], ["force.dat", "moment.dat", "yPlus.dat"], ["star.csv"]):
+        assert main(["import", *files, "--rpm", f"{RPM}", "--setup", "wall=function", "--out", "run.toml"]) == 0
+        assert "y+ of walls" not in capsys.readouterr().out
+        assert main(["compare", "run.toml", "--case", "10x5"]) == 0
+        said = " ".join(capsys.readouterr().out.split())
+        assert "wall functions, mean y+ 92.5, up to 1392" in said and "above the log layer" in said
+
+
+def test_what_an_audit_calls_not_stated_can_be_stated_by_the_key_that_it_names(
+    put: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    foam(put)
+    told = ["postProcessing", "--rpm", f"{RPM}", "--out", "run.toml", "--setup"]
+    assert main(["import", *told, "domian=3"]) == 2 and "domian: an unknown key" in capsys.readouterr().err
+    values = {"domain_over_D": "8", "compressible": "yes", "balance_mass": "0.001", "balance_momentum": "-0.002",
+              "wall": "function", "y_plus": "60", "turbulence": "k-omega SST"}  # fmt: skip
+    assert main(["import", *told, "grids=1"]) == 0
+    capsys.readouterr()
+    open_ = one_run.text(one_run.compare_run("run.toml", "10x5"))
+    assert all(key in open_.partition("--setup KEY=VALUE")[2] for key in values)
+    assert main(["import", *told, "grids=1", *(f"{k}={v}" for k, v in values.items())]) == 0
+    found = one_run.compare_run("run.toml", "10x5")
+    assert not [line.topic for line in found.audit if line.status == "not stated"]
+    assert "--setup KEY=VALUE" not in one_run.text(found)
 
 
 def test_a_written_run_is_read_back() -> None:
@@ -588,6 +632,22 @@ def test_what_is_a_unit_or_a_sign_is_no_physics(
     assert words in head and ("agree" in head) == (not words)
 
 
+def test_a_fan_whose_run_does_not_split_its_thrust_keeps_the_limits_of_a_fan(
+    put: Callable[..., Path], project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = [
+        str(put("T.out", rfile("thrust", steady(23.5), None))),
+        str(put("Q.out", rfile("torque", steady(0.285), None))),
+    ]
+    case = ["--case", str(project / "cases" / "ds30")]
+    told = ["--rpm", "55000", "--unit", "thrust=N", "--unit", "torque=N m"]
+    assert main(["import", *files, *told, "--out", "run.toml"]) == 0
+    for command in (["compare", "run.toml"], ["import", "run.toml"], ["diagnose", "run.toml"]):
+        capsys.readouterr()
+        main([*command, *case])
+        assert "must be" not in capsys.readouterr().out
+
+
 def test_a_bench_is_no_cfd_and_has_the_u_of_a_stand(put: Callable[..., Path]) -> None:
     from bemt.judge.compare import one_run
 
@@ -713,6 +773,16 @@ def test_a_unit_is_named_only_where_it_was_open_and_fits_every_point() -> None:
     two = _told({"thrust_N": [18.7, 18.7], "torque_Nm": [25.4, 25.4]}, both)
     assert "check the unit" not in two  # a unit of one load leaves the other unexplained
     assert _told({"thrust_N": [4.448, 4.448], "torque_Nm": [1.356 * 12, 1.356 * 12]}, both).count("taken for") <= 1
+
+
+def test_loads_that_are_off_by_one_factor_are_no_unit_of_one_of_them() -> None:
+    """PPTC beside a case of another size, a full model told to be one of seven sectors, rad/s given as rev/min."""
+    both = frozenset({"thrust_N", "torque_Nm"})
+    for thrust, torque, words in ((4.448, 4.3, "diameter"), (7.1, 6.8, "sector"), (1 / 4.4, 1 / 4.6, "density"),
+                                  (88.0, 93.0, "rad/s taken for rev/min")):  # fmt: skip
+        for units_open in (both, frozenset[str]()):
+            told = _told({"thrust_N": [thrust] * 2, "torque_Nm": [torque] * 2}, units_open)
+            assert words in told and "check the unit" not in told and ("then the units" in told) == bool(units_open)
 
 
 def test_coefficients_have_no_unit() -> None:

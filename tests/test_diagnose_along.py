@@ -201,6 +201,12 @@ def test_slices_are_compared_at_the_speed_of_the_recording(tmp_path: Path) -> No
     one = slices(tmp_path, "one.csv", "r [mm],dT/dr [N/m],dQ/dr [N m/m]", 1e3, (made[0], made[1] / 2, made[2] / 2))
     (told,) = bemt.diagnose(run, case, along=one).to_dict()["along_blade"].values()
     assert "are they of all blades" in told["whole"] and not told["named"]
+    inner = (over > 0.45) & (over < 0.92)  # neither the hub nor the tip is reached
+    for times in (1.0, 0.5):
+        short = slices(tmp_path, "short.csv", "r [mm],dT/dr [N/m],dQ/dr [N m/m]", 1e3,
+                       (made[0][inner], times * made[1][inner], times * made[2][inner]))  # fmt: skip
+        (told,) = bemt.diagnose(run, case, along=short).to_dict()["along_blade"].values()
+        assert bool(told["whole"]) == (times < 1.0)
     with pytest.raises(InputError, match="mm in a column of m"):
         along(case, slices(tmp_path, "mm.csv", "r_m,thrust_per_radius_N_m,torque_per_radius_Nm_m", 1e3, made))
     with pytest.raises(InputError, match=r"dT/dr: got no unit"):

@@ -93,6 +93,15 @@ def test_stations_that_leave_a_doubt_are_refused_with_what_to_write(head: str, w
         write(Wanted("mine", str(tmp_path / "blade.csv"), diameter_mm=2e3 * R), str(tmp_path / "mine"))
 
 
+def test_the_hub_ends_where_the_innermost_station_is(tmp_path: Path) -> None:
+    """Of a fan as well, whose hub is a third of its tip and more."""
+    from bemt.rotors.case.fresh import of_stations
+
+    for first in (21.0, 30.0, 9.0):
+        (tmp_path / "b.csv").write_text(f"r_mm,chord_mm,beta_deg\n{first},24,52\n41,24,35\n59.6,20,26\n")
+        assert of_stations(tmp_path / "b.csv", 0.1192)[0] == pytest.approx(first / 59.6)
+
+
 def test_a_missing_file_of_stations_is_called_missing(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
         write(Wanted("mine", str(tmp_path / "none.csv"), diameter_mm=254.0), str(tmp_path / "mine"))

@@ -27,13 +27,15 @@ from bemt.app.cli import main
 from bemt.base.tables import csv_block, json_text, number_text, plain
 from bemt.physics.bem import Model
 from bemt.physics.k1k2 import U_MEASURED
+from bemt.results.report.diagnosis_block import lead
 from bemt.results.sweep import batch, fingerprint
 from bemt.results.sweep import batch as sweep_module
 from bemt.results.sweep import grid as grid_module
 from bemt.results.sweep.answer import _agreement
 from bemt.results.sweep.answer import summary as summary_of
 from bemt.results.sweep.case import solve_case
-from bemt.results.sweep.rows import Comparison, Result
+from bemt.results.sweep.rows import Comparison, Result, beside
+from bemt.results.sweep.store import case_text
 from bemt.rotors.case import load_case
 from bemt.rotors.case.prepare import prepare_case
 
@@ -115,6 +117,21 @@ def test_an_assumption_on_temperature_leaves_the_density_that_a_reference_states
     assert own["density_kg_m3"] != pytest.approx(reference["density_kg_m3"])
     assert own["u_input"] > 0.02 * own["thrust_N"]  # density moves by +-7 %
     assert reference["u_input"] < 0.005 * reference["thrust_N"]  # viscosity and Mach number only
+
+
+def test_a_recording_stands_beside_bemt_at_its_own_density(tmp_path: Path) -> None:
+    """A bench in thin air and CFD at the case's density: two rows of one speed, each with its own recording."""
+    told = [f"thrust,{value},N,0.1,{kind},{kind},,6000,0,{rho}" for value, kind, rho in
+            ((4.9, "cfd", 1.2), (4.1, "bench", 1.0))]  # fmt: skip
+    path = make_case(tmp_path, references="\n".join([REFERENCES.splitlines()[0], *told]) + "\n")
+    result = solve_case(load_case(path))
+    table = summary_of([result]).splitlines()[:3]
+    assert "kg/m3" in table[0] and "T kgf" in case_text(result).split("kg/m3", 2)[2].splitlines()[0]
+    assert ["1.200" in table[1], "cfd" in table[1], "bench" in table[1]] == [True, True, False]
+    assert ["1.000" in table[2], "cfd" in table[2], "bench" in table[2]] == [True, False, True]
+    own = lead(result)
+    assert own is not None and [c.source for c in result.comparisons if c.quantity == "thrust_N" and c.model == "bemt"
+                                and beside(c, own)] == ["cfd"]  # fmt: skip
 
 
 REQUIRED = {"source": str, "thrust_N": float, "thrust_kgf": float, "torque_Nm": float, "CT": float, "CP": float,

@@ -52,7 +52,7 @@ class Average:
     # Time span averaged. [s] (rows of a steady run)
     start: float
     end: float
-    drift: float | None = None  # Change over the span relative to the mean [1]; None when it cannot be told
+    drift: float | None = None  # Change over the mean [1], positive where it grows in size; None when it cannot be told
     spread: float | None = None  # Largest minus smallest value in the span relative to the mean [1]
     per_revolution: tuple[float, ...] = ()  # Mean of each averaged revolution, in time order [unit of the values]
     problem: str = ""  # Why there is no mean, or what makes it doubtful; empty when nothing does
@@ -77,13 +77,13 @@ def _relative(change: float, mean: float | None) -> float | None:
     if mean is None or mean == 0.0:
         return None
     with np.errstate(over="ignore", invalid="ignore"):
-        value = float(np.float64(change) / np.float64(abs(mean)))
+        value = float(np.float64(change) / np.float64(mean))
     return value if math.isfinite(value) else None
 
 
-def _spread(values: Array, mean: float | None) -> float | None:
+def _spread(values: Array, mean: float) -> float | None:
     with np.errstate(over="ignore", invalid="ignore"):
-        return _relative(float(np.max(values) - np.min(values)), mean)
+        return _relative(float(np.max(values) - np.min(values)), abs(mean))
 
 
 def time_steps(time: ArrayLike) -> Array:

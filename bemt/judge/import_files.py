@@ -180,12 +180,12 @@ def words(given: Mapping[str, str] | Sequence[str]) -> list[str]:
     return [f"{name}={value}" if name else str(value) for name, value in given.items()]
 
 
-def _rotor(case: Propeller | File) -> tuple[float, float]:
-    """Diameter [m] and density [kg/m3] of a case."""
+def _rotor(case: Propeller | File) -> tuple[float, float, bool]:
+    """Diameter [m] and density [kg/m3] of a case, and whether it has a duct."""
     from bemt.rotors.propeller import rotor_of
 
     made = rotor_of(case).case
-    return made.diameter_m, float(made.air().rho)
+    return made.diameter_m, float(made.air().rho), made.ducted
 
 
 def _beside(

@@ -113,6 +113,8 @@ class SetupTable(Table):
     domain_over_D: float | None = entry("diameter of the domain over that of the disk", low=0.5, high=1000)
     wall: Literal["function", "scalable", "automatic", "resolved"] | None = entry("wall treatment")
     y_plus: float | None = entry("mean distance of the first cell in wall units", low=0.0, high=1e5)
+    balance_mass: float | None = entry("residual of mass over the flow through the disk", low=-1.0, high=1.0)
+    balance_momentum: float | None = entry("of momentum over the thrust", low=-1.0, high=1.0)
 
 
 class RunToml(Table):

@@ -35,11 +35,11 @@ def is_recording(record: Dataset, adapted: bool) -> bool:
 
 
 def findings(
-    record: Dataset, diameter_m: float | None = None, density_kg_m3: float | None = None
+    record: Dataset, diameter_m: float | None = None, density_kg_m3: float | None = None, ducted: bool = False
 ) -> tuple[Finding, ...]:
     """Faults of a recording, of a rotor as far as it is known."""
     measured = record.kind in ("bench", "table")
-    return check(record, diameter_m=diameter_m, density_kg_m3=density_kg_m3) if measured else ()
+    return check(record, diameter_m=diameter_m, ducted=ducted, density_kg_m3=density_kg_m3) if measured else ()
 
 
 def reduction_of(record: Dataset) -> Dataset | str:

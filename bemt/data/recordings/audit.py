@@ -42,7 +42,7 @@ incompressible flow (at tip Mach 0.625, isentropic gas, ``reports/cfd``; torque 
 realizable k-epsilon for k-omega SST.  The last two are differences on one grid of 249,000 cells from before the
 periodic sides were mended, and have not been measured again."""
 
-M_TIP_NEGLIGIBLE = 0.3
+M_TIP_NEGLIGIBLE, M_TIP_MODERATE = 0.3, 0.5
 M_TIP_KNOWN = 0.75
 """Tip Mach number above which the quadratic rule is no longer taken: shocks. [1]"""
 BLOCKAGE_KNOWN = 0.25
@@ -70,7 +70,9 @@ class CfdFacts:
     cells: float = math.nan  # Cells of the grid [1]
     drift: float = math.nan  # Change of the thrust over the averaged iterations or revolutions, relative [1]
     wall: str = ""  # ``function``, ``scalable``, ``automatic``, ``resolved`` or empty
-    y_plus: float = math.nan  # Mean distance of the first cell in wall units [1]
+    # Mean distance of the first cell in wall units, and the largest [1]
+    y_plus: float = math.nan
+    y_plus_max: float = math.nan
     turbulence: str = ""  # Model; empty is not stated
     thrust_from: str = ""  # ``forces``, ``node``, ``momentum`` or empty
     steady_mrf: bool | None = None  # Whether the rotor was frozen in a rotating frame
@@ -134,12 +136,13 @@ def _compressibility(f: CfdFacts) -> Judged:
         shocks = "shocks and wave drag are missing: " if told else ""
         return "fault" if told else "not stated", words, f"{shocks}beyond the measured rule", math.nan
     if f.ducted:
-        return "fault" if told else "not stated", words, "no rule measured for ducted rotors", math.nan
+        size = f"an open rotor's thrust is {bias:.1%} low (own runs, M^2); no rule measured for ducted rotors"
+        return ("doubtful" if M <= M_TIP_MODERATE else "fault") if told else "not stated", words, size, math.nan
     if not told:
         low = f"thrust up to {bias:.1%} low if incompressible (own runs, M^2)"
         return "not stated", words, low, bias / math.sqrt(3.0)
     low = f"thrust about {bias:.1%} low, torque a fifth more than that (own runs, M^2)"
-    return "doubtful" if M <= 0.5 else "fault", words, low, bias
+    return "doubtful" if M <= M_TIP_MODERATE else "fault", words, low, bias
 
 
 def _grid(f: CfdFacts) -> Judged:
@@ -172,7 +175,7 @@ def _wall(f: CfdFacts) -> Judged:
     }.get(f.wall, "wall treatment not stated")  # fmt: skip
     if math.isnan(y):
         return "not stated", f"{words}; y+ not stated", "skin friction and stall unknown", math.nan
-    words = f"{words}, mean y+ {y:.3g}"
+    words = f"{words}, mean y+ {y:.3g}" + (f", up to {f.y_plus_max:.4g}" if math.isfinite(f.y_plus_max) else "")
     if not f.wall:
         return "not stated", words, "unknown", math.nan
     if f.wall == "resolved":
@@ -180,6 +183,8 @@ def _wall(f: CfdFacts) -> Judged:
             return "fine", words, "none", 0.0
         return "fault", words, "the sublayer is not resolved", math.nan
     if 30.0 <= y <= 300.0:
+        if f.y_plus_max > 300.0:
+            return "doubtful", words, "first cell above the log layer in places", math.nan
         return "fine", words, "within the log layer", 0.0
     if y > 300.0:
         return "fault", words, "first cell above the log layer", math.nan
@@ -242,6 +247,15 @@ JUDGES: Mapping[str, Callable[[CfdFacts], Judged]] = {
     "iterative drift": _drift, "balance of mass and momentum": _balance, "wall treatment against y+": _wall,
     "turbulence model": _turbulence, "where the thrust was read": _thrust, "frozen rotor against inflow": _frame,
 }  # fmt: skip
+
+
+KEYS: Mapping[str, str] = {
+    "domain against disk": "domain_over_D", "compressibility against tip Mach": "compressible",
+    "grid study": "grids, gci_pct", "balance of mass and momentum": "balance_mass, balance_momentum",
+    "wall treatment against y+": "wall, y_plus", "turbulence model": "turbulence",
+    "frozen rotor against inflow": "steady",
+}  # fmt: skip
+"""Keys of [setup] in a run.toml that answer what a line calls not stated."""
 
 
 def audit(facts: CfdFacts) -> tuple[AuditLine, ...]:
@@ -329,6 +343,7 @@ def facts_of(get: Callable[[str], Any], own: bool, **flow: float) -> CfdFacts:
         grids=_whole(get("grids"), 0 if own else None), u_grid=number_or(get("u_grid")), cells=number_or(get("cells")),
         drift=number_or(get("drift_thrust")), wall=str(get("wall") or ("function" if own else "")),
         y_plus=number_or(get("y_plus"), number_or(get("yplus_avg"))),
+        y_plus_max=number_or(get("y_plus_max")),
         turbulence=_WALLS.get(str(turbulence), str(turbulence or "")),
         thrust_from="forces" if own else str(get("thrust_from") or ""), steady_mrf=True if own else get("steady"),
         skew_deg=number_or(get("sideslip_deg"), 0.0), mass_balance=number_or(get("balance_mass")),

@@ -60,16 +60,27 @@ def cfd_files(folder: Path) -> tuple[Path, ...]:
     return tuple(p for p in sorted(found) if p.is_file() and readers.kind_of(p) in PROGRAMS)
 
 
-def y_plus(files: Sequence[Path]) -> dict[str, float]:
-    """Mean y+ of each patch at the last time of the yPlus.dat that OpenFOAM wrote beside the forces; {}: none [1]."""
+def y_plus(files: Sequence[Path]) -> dict[str, tuple[float, float]]:
+    """Mean and largest y+ of each patch at the last time of the yPlus.dat beside the forces; {}: none [1]."""
     beside = {f.with_name(WALLS) for f in files}
     for post in {f.parents[2] for f in files if len(f.parents) > 2}:
         beside |= {*post.glob(f"*/*/{WALLS}")} if post.name == "postProcessing" else set()
-    out: dict[str, float] = {}
+    out: dict[str, tuple[float, float]] = {}
     for path in sorted(p for p in beside if p.is_file()):
         for cells in map(str.split, readers.load_text(path).lines):
             if len(cells) == 5 and (average := readers.number(cells[4])) is not None:
-                out[cells[1]] = average
+                out[cells[1]] = average, readers.number(cells[3]) or math.nan
+    return out
+
+
+def monitored_y_plus(columns: Iterable[LoadColumn]) -> dict[str, tuple[float, float]]:
+    """Mean and largest y+ of each zone by monitors beside the loads, as :func:`y_plus`."""
+    out: dict[str, tuple[float, float]] = {}
+    for c in columns:
+        if _OTHER["y+ of walls"].search(c.stem) and not re.search("min", c.stem, re.IGNORECASE):
+            mean, most = out.get(c.zone, (math.nan, math.nan))
+            most, mean = (level(c), mean) if re.search("max", c.stem, re.IGNORECASE) else (most, level(c))
+            out[c.zone] = mean, most
     return out
 
 
@@ -184,7 +195,7 @@ def settled(
         over = found.span + ("; revolutions differ by more than 2 %" if wide else "")
         if found.drift is None:
             over += ", with none before it: nothing says that it has settled"
-        drift = math.nan if found.drift is None else found.drift * abs(found.mean)
+        drift = math.nan if found.drift is None else found.drift * found.mean
         return Settled(np.array([found.mean]), drift, scatter, over)
     if clock == "iteration":
         found = steady_average(values)
@@ -192,7 +203,7 @@ def settled(
             return found.problem
         part = values[values.size - found.rows :]
         over = f"last {found.rows} of {values.size} rows{coarse}"
-        return Settled(np.array([found.mean]), (found.drift or 0.0) * abs(found.mean), float(np.std(part)), over)
+        return Settled(np.array([found.mean]), (found.drift or 0.0) * found.mean, float(np.std(part)), over)
     mean = record.means
     over = "as in the file"
     if values.size > 1 and mean and record.format == "fluent_transcript":

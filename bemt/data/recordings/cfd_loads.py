@@ -56,7 +56,7 @@ class OpenRun:
     zones: frozenset[str] = frozenset()  # whose forces are the thrust
     elsewhere: list[Elsewhere] = field(default_factory=list)
     unread: str = ""  # columns in which alone some rows differ
-    walls: Mapping[str, float] = field(default_factory=dict)  # mean y+ by patch [1]
+    walls: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # mean and largest y+ by patch [1]
     pools: dict[str, dict[str, LoadColumn]] = field(default_factory=dict)  # columns of each load by zone
 
     def fault(self, at: LoadColumn | None, where: str, got: str, expected: str, hint: str = "") -> None:

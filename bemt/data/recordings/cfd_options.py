@@ -153,7 +153,10 @@ def run_from(
                 "reference": _numbers(reference, faults), "setup": told}  # fmt: skip
     out = Collector("")
     made = validated(RunToml, {k: v for k, v in document.items() if k != "grids" or v}, out)
-    faults += [Fault("", _option(f.where), f.got, f.expected, f.hint) for f in out.faults]
+    for f in out.faults:
+        key = f.where.removeprefix("setup.")
+        got = f.got if key == f.where else f"{key}: {f.got}"
+        faults.append(Fault("", _option(f.where), got, f.expected, f.hint))
     if faults or made is None:
         raise InputError(faults)
     return made

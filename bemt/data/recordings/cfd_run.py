@@ -33,6 +33,7 @@ from bemt.data.recordings.cfd_files import (
     cfd_files,
     clock_of,
     columns_of,
+    monitored_y_plus,
     other_than_loads,
     read_run,
     settled,
@@ -159,7 +160,8 @@ def _opened(run: RunToml, folder: Path, name: str) -> tuple[OpenRun, list[tuple[
     told = {"restart": False, "joined": False, "left out": False, "rhoInf": bool(run.reference.density_kg_m3),
             "--sector": bool(run.run.sector)}  # fmt: skip
     notes = [n for _, r in read for n in r.notes if any(word in n and not said for word, said in told.items())]
-    return OpenRun(run, name, columns, complete=not faults, notes=notes, faults=faults, walls=walls), read
+    return OpenRun(run, name, columns, complete=not faults, notes=notes, faults=faults,
+                   walls=walls or monitored_y_plus(columns)), read  # fmt: skip
 
 
 def _summed(work: OpenRun, quantity: str) -> dict[str, Settled]:
@@ -302,7 +304,7 @@ def _applied(work: OpenRun, rpm: Array, loads: Mapping[str, Settled]) -> _Points
         size = math.hypot(*(abs(x) for x in (found.drift, found.scatter) if math.isfinite(x)), 0.0)
         points.u[name] = np.broadcast_to(size * times, values[name].shape).copy()
         points.averaged[name] = found.over
-        mean = float(np.nanmean(np.abs(found.values))) if np.isfinite(found.values).any() else math.nan
+        mean = float(np.nanmean(found.values)) if np.isfinite(found.values).any() else math.nan
         if math.isfinite(found.drift) and mean:
             drift = points.drift[name] = found.drift / mean
             if abs(drift) > LOST:
@@ -381,7 +383,8 @@ def _conditions(
         "steady": False if "time" in clocks else True if "iteration" in clocks else None, "thrust_from": "forces",
     }  # fmt: skip
     fine = [v for k, v in work.walls.items() if TURNS.search(k)] or list(work.walls.values())
-    found["y_plus"] = float(np.mean(fine)) if fine else None
+    means, most = ([v for v in column if math.isfinite(v)] for column in zip(*fine, strict=True)) if fine else ([], [])
+    found |= {"y_plus": float(np.mean(means)) if means else None, "y_plus_max": max(most, default=None)}
     more = {"drift_thrust": drift, "u_grid": _stated_grid(work).get("thrust_N")}
     return {k: v for part in (found, work.run.setup.given(), more) for k, v in part.items() if v is not None}
 
@@ -427,17 +430,19 @@ def _dataset(work: OpenRun, points: _Points, read: Sequence[tuple[str, Dataset]]
     return with_grid_floor(made, u, (f"u of the grid: {told}, as stated",) if u else ())
 
 
-def _slips(run: CfdRun, diameter_m: float | None = None, density_kg_m3: float | None = None) -> tuple[str, ...]:
+def _slips(
+    run: CfdRun, diameter_m: float | None = None, density_kg_m3: float | None = None, ducted: bool = False
+) -> tuple[str, ...]:  # fmt: skip
     """Slips of a unit that the loads of a run show; what lies elsewhere is none."""
     of_case = {"diameter_m": diameter_m, "density_kg_m3": density_kg_m3}
-    found = () if run.elsewhere else check(run, ducted="duct_thrust_N" in run, **of_case)
+    found = () if run.elsewhere else check(run, ducted=ducted or "duct_thrust_N" in run, **of_case)
     open_ = density_kg_m3 is None and "density_kg_m3" not in run
     fluid = "density, not stated and taken for that of air (--density-kg-m3), or " if open_ else ""
     return tuple(f"{f.evidence}. Suggestion: {fluid}{f.correction}" for f in found if f.severity != "note")
 
 
-def of_rotor(run: CfdRun, diameter_m: float, density_kg_m3: float) -> CfdRun:
+def of_rotor(run: CfdRun, diameter_m: float, density_kg_m3: float, ducted: bool) -> CfdRun:
     """A run of a rotor that is known, in air or water of its case: no slip is seen by a diameter that was guessed."""
     guessed = set(_slips(run))
-    said = _slips(run, diameter_m, density_kg_m3)
+    said = _slips(run, diameter_m, density_kg_m3, ducted)
     return replace(run, notes=(*said, *(note for note in run.notes if note not in guessed)))

@@ -34,7 +34,7 @@ from bemt.data.recordings.adapt import (
     is_recording,
     reduction_of,
 )
-from bemt.data.recordings.cfd_files import PROGRAMS, cfd_files, other_than_loads
+from bemt.data.recordings.cfd_files import PROGRAMS, WALLS, cfd_files, other_than_loads
 from bemt.data.recordings.grids import merged, of_table
 from bemt.data.recordings.reduce import reduction
 from bemt.data.recordings.shown import INTERNAL, Imported, ImportedFile, options_of
@@ -115,16 +115,18 @@ def _unsettled(record: Dataset) -> list[str]:
 def import_files(
     paths: Iterable[str | os.PathLike[str]], format: str | None = None, choice: Choice | None = None,  # noqa: A002
     run: RunToml | None = None, insist: bool = False, stated: Mapping[str, Dataset] = {},  # noqa: B006
-    rotor: tuple[float, float] | None = None,
+    rotor: tuple[float, float, bool] | None = None,
 ) -> Imported:  # fmt: skip
     """Read files, those of `stated` as the user states them; with ``insist`` they must be the CFD run of ``run``.
 
-    `rotor`: diameter [m] and density [kg/m3] of the case, as far as it is known.
+    `rotor`: diameter [m], density [kg/m3] and duct of the case, as far as it is known.
     """
     names = [os.fspath(path) for path in paths]
     runs, to_do = runs_of(names, run, insist)
     if runs or to_do:
-        names = [name for name in names if not (Path(name).is_dir() and cfd_files(Path(name)))]
+        whole = {f for d in runs for f in d.files}
+        names = [n for n in names if not (Path(n).is_dir() and cfd_files(Path(n)))
+                 and not (Path(n).name == WALLS and (to_do or n in whole))]  # fmt: skip
     records: dict[str, Dataset] = {}
     errors: dict[str, str] = {}
     for name in names:
@@ -229,7 +231,8 @@ def _study(run: RunToml, insist: bool) -> list[Dataset]:
 def _runs_and_exports(names: Sequence[str], insist: bool) -> tuple[list[Dataset], list[str]]:
     """Which names are a run by themselves, as a run.toml is, and which are exports of CFD programs."""
     runs, exports = [], list[str]()
-    for name in names:
+    walls = [n for n in names if Path(n).name == WALLS]
+    for name in [n for n in names if n not in walls] or names:
         at = Path(name)
         try:
             if at.is_dir() and not (at / "run.toml").is_file():
@@ -241,7 +244,7 @@ def _runs_and_exports(names: Sequence[str], insist: bool) -> tuple[list[Dataset]
         except (InputError, OSError):
             if insist:
                 raise
-    return runs, exports
+    return runs, exports + walls if exports else exports
 
 
 def runs_of(
@@ -288,7 +291,7 @@ def _refusal(error: Exception) -> str:
 
 
 def _file(
-    name: str, format: str | None, record: Dataset | None, error: str | None, rotor: Sequence[float]  # noqa: A002
+    name: str, format: str | None, record: Dataset | None, error: str | None, rotor: Sequence[Any]  # noqa: A002
 ) -> ImportedFile:  # fmt: skip
     if record is None:
         return ImportedFile(name, format, error=error)
@@ -324,10 +327,10 @@ def check_format(name: str | None) -> None:
         raise InputError(Fault("", "--format", repr(name), f"one of {', '.join(importers.importers())}"))
 
 
-def as_dataset(record: Dataset, rotor: Sequence[float] = ()) -> Dataset:
+def as_dataset(record: Dataset, rotor: Sequence[Any] = ()) -> Dataset:
     """Points of what was read: steady points of a recording, rows of a table, else one point of means.
 
-    `rotor`: diameter [m] and density [kg/m3] of the case, where one is known.
+    `rotor`: diameter [m], density [kg/m3] and duct of the case, where one is known.
     """
     if cfd_run.is_run(record):
         return record

@@ -23,7 +23,7 @@ from bemt.base import unit_errors
 from bemt.base.document import Documented
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of, number_text, speed_text, text_table
-from bemt.data.recordings.audit import AuditLine, combined
+from bemt.data.recordings.audit import KEYS, AuditLine, combined
 from bemt.data.recordings.cfd_run import is_run, of_rotor, run_at
 from bemt.data.recordings.cfd_setup import (
     Elsewhere,
@@ -35,6 +35,7 @@ from bemt.data.recordings.cfd_setup import (
     stated_setup,
 )
 from bemt.data.recordings.channels import named, without_unit
+from bemt.data.recordings.slips import NEAR
 from bemt.physics.dataset import Dataset
 from bemt.rotors.as_measured import FACTOR
 from bemt.rotors.case import Case
@@ -116,11 +117,11 @@ class RunComparison(Documented):
 
 
 def cfd_points(
-    path: str, read: Dataset | None = None, rotor: tuple[float, float] | None = None
+    path: str, read: Dataset | None = None, rotor: tuple[float, float, bool] | None = None
 ) -> tuple[Dataset, Dataset]:
     """Points of a CFD recording, and the file as it was `read`: a run, or a table of runs such as a campaign's.
 
-    `rotor`: diameter [m] and density [kg/m3] of the case that it stands beside.
+    `rotor`: diameter [m], density [kg/m3] and duct of the case that it stands beside.
     """
     from bemt.data.recordings.load import as_dataset, import_file
 
@@ -161,7 +162,7 @@ def compare_run(
     given = path if isinstance(path, Dataset) else None
     name = os.fspath(path) if not isinstance(path, Dataset) else path.file or path.name
     made = rotor_of(case).case
-    points, imported = cfd_points(name, given, (made.diameter_m, float(made.air().rho)))
+    points, imported = cfd_points(name, given, (made.diameter_m, float(made.air().rho), made.ducted))
     notes, points_stated = list(points.notes), {*points.values}
     for channel, words, value in (
         ("rpm", "rev/min", made.rpm),
@@ -320,6 +321,22 @@ def _slip(
                    f"taken for {error.stated}: check the unit.")  # fmt: skip
 
 
+def _one_factor(loads: Mapping[str, Sequence[BothLoads]], units_open: Collection[str]) -> str:
+    """What to check first where thrust and torque are off by one factor, which no unit of one explains; else ""."""
+    ratio = [np.array([v.cfd / v.bemt for v in loads.get(k, ()) if v.cfd and v.bemt]) for k in _KIND]
+    if not all(r.size and np.all(r > 0.0) for r in ratio):
+        return ""
+    thrust, torque = (float(np.median(np.log(r))) for r in ratio)
+    both = 0.5 * (thrust + torque)
+    if abs(both) < math.log(_FAR) or abs(thrust - torque) > NEAR:
+        return ""
+    # loads go with the square of the speed
+    speed = next((f"the speed, as of {e.actual} taken for {e.stated}" for e in unit_errors.errors("rotation")
+                  if abs(both + 2.0 * math.log(e.factor)) <= NEAR), "speed, sector, density and diameter")  # fmt: skip
+    units = ", then the units" if set(_KIND) <= set(units_open) else ""
+    return f" Both loads are off by about a factor of {math.exp(abs(both)):.3g}: first check {speed}{units}."
+
+
 def open_units(imported: Dataset) -> frozenset[str]:
     """Loads whose unit the file did not state; coefficients have none."""
     if is_run(imported):
@@ -358,8 +375,8 @@ def _sentence(
         loads = {name: [v for n, v in every if n == name] for name, _ in off}
         if left := [words for name, own in loads.items() if (words := _not_counted(name, own, elsewhere))]:
             tail += "".join(left)
-        elif fluid:
-            tail += fluid
+        elif words := fluid or _one_factor(loads, units_open):
+            tail += words
         else:
             slips = [_slip(name, own, None if name in unitless else name in units_open, density_open)
                      for name, own in loads.items()]  # fmt: skip
@@ -453,6 +470,8 @@ def text(found: RunComparison, details: bool = False) -> str:
         lines.append(f"  averaged: {', '.join(k for k, v in found.averaged.items() if v == over)}: {over}")
     lines += ["", "Audit of the CFD run"] if found.audit else []
     lines += map(_audited, found.audit if details else found.audit[:7])
+    if keys := [KEYS[a.topic] for a in found.audit if a.status == "not stated" and a.topic in KEYS]:
+        lines.append(_filled(f"`bemt import --setup KEY=VALUE` states: {', '.join(keys)}", "  "))
     flags = list(dict.fromkeys(f for p in found.points for f in p.flags))
     said = [f"! {n}" for n in (found.notes if details else found.notes[:4])]
     said += [f"! BEMT: {f}" for f in (flags if details else flags[:2])]

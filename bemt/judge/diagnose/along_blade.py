@@ -24,6 +24,7 @@ from bemt.rotors.case.prepare import prepare_case
 if TYPE_CHECKING:
     from bemt.judge.diagnose.record import Record
     from bemt.rotors.case import Case
+    from geometry.rotor import Rotor
 
 # Root and tip are left out: hubs are not modelled, and what the last percents of a blade carry no two codes agree on.
 BANDS = np.linspace(0.40, 0.95, 6)
@@ -169,7 +170,7 @@ def along(
         air = case.air() if at.density is None else Air.from_density(at.density)
         told = compare_along(model, loads, at.rpm, at.V, air)
         state = f"at {speed_text(at.rpm)} rev/min, {number_text(at.V, 4)} m/s, {number_text(float(air.rho), 4)} kg/m3"
-        whole = _whole(loads, at, case.ducted)  # what is not the recording explains nothing of it
+        whole = _whole(loads, at, case.ducted, model.rotor)  # what is not the recording explains nothing of it
         named = () if whole else told.named
         out[run] = replace(told, state=f"{state} (speed {at.whose})", whole=whole, named=named)
     return out
@@ -221,13 +222,20 @@ def _condition(
     )
 
 
-def _whole(loads: BladeLoads, at: SliceCondition, ducted: bool) -> str:
-    """What slices add up to, where that is not what the recording has; a duct carries a thrust of its own."""
+def _whole(loads: BladeLoads, at: SliceCondition, ducted: bool, rotor: Rotor) -> str:
+    """What slices add up to, where that is not what the recording has; a duct carries a thrust of its own.
+
+    What the blade may carry beyond the outermost slices is their load up to hub and tip.
+    """
     said = []
+    within, tip = loads.r[0] - rotor.Rhub, rotor.R - loads.r[-1]
     both = (("thrust", "N", loads.thrust, at.loads[0]), ("torque", "N m", loads.torque, at.loads[1]))
     for name, unit, per, whole in both:
         total = float(np.trapezoid(per, loads.r))
-        if np.isfinite(whole) and whole and abs(total / whole - 1.0) > FINE and not (ducted and name == "thrust"):
+        most = total + max(per[0] * within, 0.0) + max(per[-1] * tip, 0.0)
+        if not np.isfinite(whole) or not whole or (ducted and name == "thrust"):
+            continue
+        if total > (1.0 + FINE) * whole or most < (1.0 - FINE) * whole:
             said.append(f"{number_text(total, 4)} {unit} of {name} (recorded: {number_text(whole, 4)})")
     return f"The slices add up to {' and '.join(said)}: are they of all blades, at this speed?" if said else ""
 

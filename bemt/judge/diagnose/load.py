@@ -82,7 +82,7 @@ def load(
         one_rotor(imported, path, "`compare A B --rows-b rotor={} --case CASE` takes one of them")
     if is_run(imported):
         speed_in_doubt(imported, path)
-        imported = of_rotor(imported, case.diameter_m, float(case.air().rho))
+        imported = of_rotor(imported, case.diameter_m, float(case.air().rho), case.ducted)
         run, gains = one_grid(imported)
         made = records.from_series(run, case, gains)
         return replace(made, notes=(*made.notes, *imported.notes), computed=True, setup=setup, whole=imported)

@@ -13,7 +13,7 @@ from bemt.data.recordings.audit import Audit
 from bemt.data.recordings.grids import LOADS, LoadStudy
 from bemt.results.report.book import CasePage, Diagnosed, Part, Picture, ShownParameter, picture
 from bemt.results.report.plot import COLOURS, DASHES, Plot, Trace, figure
-from bemt.results.sweep.rows import Comparison, Result, Row, State
+from bemt.results.sweep.rows import Comparison, Result, Row, State, beside
 
 # Sentences about a case, in the language of ASME V&V 20: nothing is ever called correct.
 
@@ -62,11 +62,6 @@ def _thrusts(result: Result) -> list[Comparison]:
     return [c for source in NAMES for c in lines if c.source == source]
 
 
-def beside(one: Row | Comparison, other: Row | Comparison) -> bool:
-    """Whether two values are of one speed of rotation and one airspeed; what states none is of the point shown."""
-    return not (abs(one.rpm - other.rpm) > 1e-6 * other.rpm or abs(one.airspeed_m_s - other.airspeed_m_s) > 1e-9)
-
-
 def lead(result: Result) -> Row | None:
     """BEMT at the point that a front page shows: the case's own, else that of the first recorded thrust."""
     own, recorded = result.first("bemt"), _thrusts(result)
@@ -84,7 +79,8 @@ def _at(value: Row | Comparison | None) -> str:
 
 def _elsewhere(c: Comparison, at: Row) -> str:
     """The speeds of a comparison that is not at a point; nothing of one that is."""
-    return "" if beside(c, at) else _at(c)
+    air = f", {c.density_kg_m3:.4g} kg/m3" if abs(c.density_kg_m3 - at.density_kg_m3) > 1e-9 else ""
+    return "" if beside(c, at) else f"{_at(c)}{air}"
 
 
 def _solved(result: Result) -> Row | tuple[str, str, str]:

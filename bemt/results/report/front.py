@@ -12,7 +12,6 @@ from bemt.base.tables import number_text, speed_text
 from bemt.results.report.book import Book, CasePage, Part, ShownAnswer, uri
 from bemt.results.report.diagnosis_block import (
     answer,
-    beside,
     diagnosis_verdict,
     headline,
     lead,
@@ -20,6 +19,7 @@ from bemt.results.report.diagnosis_block import (
     verdict,
 )
 from bemt.results.report.plot import Figure, Mark, Plot, figure, points
+from bemt.results.sweep.rows import beside
 
 SOURCES = {
     "bemt": ("BEMT", "circle", 0.28), "cfd": ("CFD, recorded", "diamond", 0.06), "bench": ("bench", "cross", 0.06),

@@ -13,7 +13,7 @@ from bemt.base.action import Answered
 from bemt.base.errors import EXIT_UNCONVERGED
 from bemt.base.tables import number_text, text_table
 from bemt.results.sweep import batch
-from bemt.results.sweep.rows import ROW_SOURCES, Comparison, Result, State, Sweep
+from bemt.results.sweep.rows import ROW_SOURCES, Comparison, Result, Row, State, Sweep, beside
 from bemt.results.sweep.store import case_text, overview_text
 from bemt.rotors.case import find_cases
 from bemt.rotors.validity import kind, serious
@@ -35,8 +35,7 @@ class _Thrust(NamedTuple):
     c: Comparison
     case: Result
     share: float  # of the largest recorded thrust [1]
-    rpm: float
-    airspeed_m_s: float
+    row: Row
 
     @property
     def rank(self) -> float:
@@ -72,11 +71,11 @@ def _compared(result: Result) -> list[_Thrust]:
     """BEMT against each recorded thrust of a case; equal values of one kind count once."""
     rows = [c for c in result.comparisons if (c.model, c.quantity) == ("bemt", "thrust_N") and c.source in ROW_SOURCES]
     largest = max((abs(c.D) for c in rows), default=0.0)
-    out: dict[tuple[str, str, float], _Thrust] = {}
+    out: dict[tuple[str, str, float, float], _Thrust] = {}
     for c in rows:
         share = abs(c.E) / largest if largest > 0.0 else 0.0
-        row = next(r for r in result.rows if r.label == c.reference)
-        out.setdefault((c.source, number_text(c.D, 3), row.rpm), _Thrust(c, result, share, row.rpm, row.airspeed_m_s))
+        row = next(r for r in result.rows if r.label == c.reference and beside(c, r))
+        out.setdefault((c.source, number_text(c.D, 3), row.rpm, row.density_kg_m3), _Thrust(c, result, share, row))
     return list(out.values())
 
 
@@ -110,9 +109,11 @@ def _lines(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
 
 def _table(solved: Sequence[Result], found: Sequence[_Thrust]) -> list[str]:
     moving = any(r.airspeed_m_s for result in solved for r in result.of("bemt"))
-    header = ["thrust [N]", "rpm", *(["V"] if moving else []), "BEMT", "W", "K1/K2", "recorded", "difference", "agree?"]
+    airs = any(len(result.densities) > 1 for result in solved)
+    point = ["rpm", *(["V"] if moving else []), *(["kg/m3"] if airs else [])]
+    header = ["thrust [N]", *point, "BEMT", "W", "K1/K2", "recorded", "difference", "agree?"]
     kept = found[: max(ROWS - len(solved), 4)]
-    body = [row for result in solved for row in _rows(result, [t for t in kept if t.case is result], moving)]
+    body = [row for result in solved for row in _rows(result, [t for t in kept if t.case is result], moving, airs)]
     shown = body[:ROWS]
     lines = _lines(header, shown)
     if max(map(len, lines)) > WIDTH:  # the power is in --details, too
@@ -130,18 +131,17 @@ def _table(solved: Sequence[Result], found: Sequence[_Thrust]) -> list[str]:
     return lines
 
 
-def _rows(result: Result, found: Sequence[_Thrust], moving: bool) -> list[list[str]]:
+def _rows(result: Result, found: Sequence[_Thrust], moving: bool, airs: bool) -> list[list[str]]:
     """Rows of a case: its first point, and those with a recorded value beside them; what repeats is left blank."""
-    formula = {(r.rpm, r.airspeed_m_s): r.thrust_N for r in result.of("k1k2")}
     body: list[list[str]] = []
     for k, row in enumerate(result.of("bemt")):
-        here = (row.rpm, row.airspeed_m_s)
         told = [[f"{number_text(t.c.D, 3)} {t.c.source}", f"{t.c.E:+.3g}{_percent(t)}", _agreement(t.c)]
-                for t in found if (t.rpm, t.airspeed_m_s) == here]  # fmt: skip
+                for t in found if beside(t.row, row)]  # fmt: skip
         u = "" if not math.isfinite(row.u) else f" ± {number_text(row.u, 2)}"
         cells = [f"{row.rpm:.0f}", *([f"{row.airspeed_m_s:g}"] if moving else []),
+                 *([number_text(row.density_kg_m3, 4)] if airs else []),
                  f"{number_text(row.thrust_N, 3)}{u}", number_text(row.power_W, 3),
-                 number_text(formula.get(here), 3)]  # fmt: skip
+                 number_text(next((r.thrust_N for r in result.of("k1k2") if beside(r, row)), None), 3)]  # fmt: skip
         for words in told or ([] if k else [["-", "", ""]]):
             body.append([_name(result.name) if not body else "", *cells, *words])
             cells = [""] * len(cells)

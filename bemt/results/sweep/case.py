@@ -107,7 +107,7 @@ def _compare(model: str, values: Dataset, at: int, channel: str, row: Row, u_D: 
     u_num, u_input, u_model = (_part(values, origin, channel, at) for origin in ("numerics", "input", "model"))
     doubts = tuple(serious(values.flags[at]))
     return Comparison(model, row.label, row.source, channel, COMPARED[channel], S, recorded, u_num, u_input,
-                      u_model, u_D, doubts, row.rpm, row.airspeed_m_s)  # fmt: skip
+                      u_model, u_D, doubts, row.rpm, row.airspeed_m_s, row.density_kg_m3)  # fmt: skip
 
 
 def _formula(case: Case, at: Points) -> tuple[Dataset, Dataset]:

@@ -47,6 +47,7 @@ class Comparison(Documented):
     doubts: tuple[str, ...] = ()  # Flags for which agreement means little here
     rpm: float = math.nan
     airspeed_m_s: float = math.nan
+    density_kg_m3: float = math.nan
 
     def __post_init__(self) -> None:
         """Fill in what follows; a stored line keeps what was computed before its parts were rounded."""
@@ -56,6 +57,11 @@ class Comparison(Documented):
         for name, value in follows.items():
             if math.isnan(getattr(self, name)):
                 object.__setattr__(self, name, value)
+
+    @property
+    def point(self) -> tuple[float, float, float]:
+        """Operating point: speed [rev/min], airspeed [m/s], density [kg/m3]."""
+        return self.rpm, self.airspeed_m_s, self.density_kg_m3
 
     @property
     def known(self) -> float:
@@ -145,6 +151,16 @@ class Row(Documented):
     bemt_u_val: float | None = None
     k1k2_error_pct: float | None = None
     k1k2_u_val: float | None = None
+
+    @property
+    def point(self) -> tuple[float, float, float]:
+        """Operating point as :attr:`Comparison.point`."""
+        return self.rpm, self.airspeed_m_s, self.density_kg_m3
+
+
+def beside(one: Row | Comparison, other: Row | Comparison) -> bool:
+    """Whether two values are of one speed, airspeed and density; what states none is of the point shown."""
+    return not any(abs(a - b) > max(1e-6 * b, 1e-9) for a, b in zip(one.point, other.point, strict=True))
 
 
 class CaseConditions(Documented):
@@ -336,6 +352,11 @@ class Result(Documented):
         """Conditions of a solved case."""
         assert self.conditions is not None
         return self.conditions
+
+    @property
+    def densities(self) -> set[float]:
+        """Densities of its points [kg/m3]."""
+        return {row.density_kg_m3 for row in self.of("bemt")}
 
     def of(self, *sources: str) -> list[Row]:
         """Rows of some sources."""

@@ -73,6 +73,10 @@ def _main_table(result: Result) -> str:
             _pct(row.bemt_error_pct),
             _pct(row.k1k2_error_pct), _u_val(row), ",".join(marks),
         ])  # fmt: skip
+    if len(result.densities) > 1:
+        header.insert(3, "kg/m3")
+        for cells, row in zip(body, result.all_rows, strict=True):
+            cells.insert(3, _n(row.density_kg_m3))
     if angle := result.at.angle_deg:
         header[3:3] = ["angle deg", "H N"]
         for cells, row in zip(body, result.all_rows, strict=True):

@@ -423,7 +423,7 @@ def of_stations(file: Path, diameter_m: float) -> tuple[float, str, BladeStation
 
     key = key_of(file)
     found = stations_in(file, 0.5 * diameter_m, key)
-    return float(np.clip(found.r_R.min(), 0.05, 0.3)), key, found
+    return max(float(found.r_R.min()), 0.05), key, found
 
 
 _MAKERS = {"t", "q", *FAMILIES, *(word.casefold() for name in FAMILIES.values() for word in name.split())} - {"prop"}

@@ -195,6 +195,8 @@ class FanExport(DiskExport):
         table = [",".join(f'"{text}"' for text in head)]
         table += [",".join(f"{x:.9e}" for x in row) for row in zip(*rows.values(), strict=True)]
         side = "counter-clockwise" if p.sense > 0 else "clockwise"
+        momentum = "of momentum over each ring, w (w - V) = pressure-jump / (2 rho)"
+        speed = "of the prediction, losses of the duct included" if job.case.ducted else momentum
         words = [
             f"{job.case.name}: {p.rpm:.9g} rev/min, {p.airspeed_m_s:.9g} m/s, {p.rho:.9g} kg/m3; load by BEMT",
             f"thrust of the rotor {p.thrust_N:.6g} N, torque {p.torque_Nm:.6g} N m",
@@ -202,6 +204,7 @@ class FanExport(DiskExport):
             "thrust along +z, on the rotor; the air is pushed along -z: a fan boundary whose flow goes along -z",
             f"turns {side} seen from +z, looking along -z; the air behind turns the same way",
             "units: m, Pa, m/s",
+            f"axial speed behind that swirl: {speed}",
             *(f"{name}: {what}" for name, (_, what) in COLUMNS.items()),
             "body force of a layer of thickness t: pressure-jump / t and tangential-stress / t [N/m3]",
         ]
@@ -223,17 +226,14 @@ def fields(job: Job) -> tuple[Array, dict[str, Array]]:
     """Radii [m] and the fields of the profile: pressures [Pa] and the velocity of the swirl [m/s].
 
     The swirl is what the torque of a ring leaves in the mass that passes it, v_t = dQ / (r dm), with the speed through
-    the disk of a momentum balance, w (w - V) = dp / (2 rho) for an open rotor; in a duct that of the whole thrust.
+    the disk of a momentum balance, w (w - V) = dp / (2 rho) for an open rotor; in a duct with that of the prediction.
     """
     p = job.loading
     r, thrust, torque = tables(p)
     jump, stress = thrust / (2.0 * math.pi * r), torque / (2.0 * math.pi * r**2)
     V = p.airspeed_m_s
     if job.case.ducted:
-        area = math.pi * (p.R**2 - p.Rhub**2)
-        jet = math.sqrt(max(V**2 + 2.0 * p.thrust_N / (p.rho * area), 0.0))
-        total = p.thrust_N + p.duct_thrust_N
-        w = np.full_like(r, total / (p.rho * area * (jet - V)) if jet > V else max(V, 1e-9))
+        w = np.interp(r, p.r, p.w)
     else:
         w = 0.5 * (V + np.sqrt(np.maximum(V**2 + 2.0 * jump / p.rho, 0.0)))
     swirl = np.divide(stress, p.rho * w, out=np.zeros_like(r), where=w > 0.0)

@@ -351,7 +351,9 @@ class Loading:
     alpha: Array
     Re: Array
     M: Array
-    W: Array  # (N,) speed that the loads are made of [m/s]
+    # (N,) speed that the loads are made of; axial speed through the disk, in a duct the mean of the ring [m/s]
+    W: Array
+    w: Array
     # Tip and hub radius [m]
     R: float
     Rhub: float
@@ -415,6 +417,6 @@ def loading_of(case: Case, rpm: float, airspeed_m_s: float) -> Loading:
         raise AssertionError(f"radial loads do not sum to the totals: {scale}")
     return Loading(
         float(rpm), float(airspeed_m_s), float(air.rho), float(air.mu), float(air.a_sound), at.r,
-        prep.stations.dr, chord, prep.st[:, K.S_BETA], at.dT, at.dQ, at.alpha, Re, M, at.W, rotor.R, rotor.Rhub,
+        prep.stations.dr, chord, prep.st[:, K.S_BETA], at.dT, at.dQ, at.alpha, Re, M, at.W, at.w, rotor.R, rotor.Rhub,
         int(rotor.B), int(rotor.rotation), float(at.dT.sum()), float(at.dQ.sum()), float(s.T_duct[0] + s.T_stator[0]),
     )  # fmt: skip
