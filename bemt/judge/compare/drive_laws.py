@@ -22,6 +22,7 @@ from bemt.judge.compare.matched import FOLLOWS_LOAD, POWER_OF_SPEED, MatchedChan
 from bemt.judge.compare.smooth_change import Scatter
 from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation, KindPrior, Sizes
 from bemt.judge.loss import Decision, decide
+from bemt.physics.effects import catalogue
 from bemt.physics.effects.base import FORM
 
 PRIOR = KindPrior(none=0.7, single=0.2, pair=0.05, unknown=0.05)
@@ -52,6 +53,11 @@ FAMILY = {
     **dict.fromkeys(("battery_sag", "motor_heating", "motor"), "drive"),
 }  # fmt: skip
 """What an engineer would look at, at once; an effect that is not listed is a family of its own."""
+FAMILY_WORD = {
+    "blade": "another blade, pitch or diameter", "surroundings": "the surroundings of the rotor",
+    "airspeed": "the airspeed", "load cell": "a load cell", "drive": "the drive", "air_density": "the density",
+    "rpm_scale": "the speed reading", "unit_slip": "a unit",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,6 +136,18 @@ _EACH = (1.0 - sum(_PRIOR.values())) / len(LAWS)
 def law(name: str) -> DriveLaw | None:
     """Row of a cause; None for effects on the rotor."""
     return next((row for row in LAWS if row.id == name), None)
+
+
+def title_of(name: str) -> str:
+    """Title of a cause, or of a pair of them: of its scaling law, or of an effect that has none."""
+    rows = [(law(k) or catalogue().get(k), k) for k in name.split("+")]
+    return " and ".join(row.title if row else FAMILY_WORD.get(k, k) for row, k in rows)
+
+
+def check_of(name: str) -> str:
+    """Measurement that distinguishes a cause from others."""
+    row = law(name)
+    return row.settles if row is not None else catalogue()[name].check if name in catalogue() else ""
 
 
 def _bases(c: MatchedChannel) -> dict[str, Array]:

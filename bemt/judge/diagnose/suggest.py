@@ -17,7 +17,8 @@ from bemt.base.units import ZERO_CELSIUS, suffixes
 from bemt.data.readers.recording import kept_beside
 from bemt.data.readers.recording_toml import QUANTITIES
 from bemt.data.recordings.shown import options_of
-from bemt.judge.compare.change_document import AIR_OF_BOTH, DAYS, title_of
+from bemt.judge.compare.change_document import AIR_OF_BOTH, DAYS
+from bemt.judge.compare.drive_laws import title_of
 from bemt.judge.compare.one_run import other_fluid
 from bemt.judge.diagnose import noise
 from bemt.judge.diagnose.assemble import assemble
