@@ -19,7 +19,7 @@ from bemt.data.readers.recording_toml import QUANTITIES
 from bemt.data.recordings.shown import options_of
 from bemt.judge.compare.change_document import AIR_OF_BOTH, DAYS
 from bemt.judge.compare.drive_laws import title_of
-from bemt.judge.compare.one_run import other_fluid
+from bemt.judge.compare.slips import other_fluid
 from bemt.judge.diagnose import noise
 from bemt.judge.diagnose.assemble import assemble
 from bemt.judge.diagnose.form import ALIKE
