@@ -344,9 +344,8 @@ def text(found: RunComparison, details: bool = False) -> str:
     """Lay it out on one screen; with `details` all points, notes and settings."""
     who, bare = ("CFD", "set-up not stated") if found.kind == "cfd" else ("recorded", "a recording")
     shown = found.points if details else _shown(found.points)
-    parts = ", ".join(
-        f"{k} {number_text(v, 2)}" for k, v in next(iter(found.points[0].loads.values())).u_bemt_by.items()
-    )
+    first = next(iter(found.points[0].loads.values()))
+    parts = ", ".join(f"{k} {number_text(v, 2)}" for k, v in first.u_bemt_by.items())
     header = ["rev/min", "V [m/s]", "", who, "BEMT", f"BEMT - {who}", "in u", ""]
     lines = [
         _filled(found.sentence), "",
@@ -372,8 +371,9 @@ def _shown(points: tuple[PointOfRun, ...]) -> tuple[PointOfRun, ...]:
     """Points that fit on one screen: the first ones, and the one of the largest difference behind them, or the next."""
     if len(points) <= _ROWS:
         return points
-    times = {p: max(float(np.nan_to_num(v.times)) for v in p.loads.values()) for p in points[_ROWS - 1 :]}
-    return *points[: _ROWS - 1], max(times, key=lambda p: times[p])
+    rest = points[_ROWS - 1 :]
+    worst = max(rest, key=lambda p: max(float(np.nan_to_num(v.times)) for v in p.loads.values()))
+    return *points[: _ROWS - 1], worst
 
 
 def _rows(p: PointOfRun) -> list[list[str]]:
