@@ -100,33 +100,23 @@ class DriveLaw:
 
 LAWS: tuple[DriveLaw, ...] = (
     DriveLaw(
-        "battery_sag",
-        "supply or battery voltage",
+        "battery_sag", "supply or battery voltage",
         ((1.0, {"speed": {"all": 1.0}}), (0.5, {"electrical": {"all": 1.0}})),
         "speed at one command follows the voltage; loads at the measured speed are unchanged",
-        "log voltage at the controller",
-        "n ~ command x V less I R",
-        (*_SIZES, 0.8),
+        "log voltage at the controller", "n ~ command x V less I R", (*_SIZES, 0.8),
     ),
     DriveLaw(
-        "motor_heating",
-        "motor heating (winding and magnets)",
+        "motor_heating", "motor heating (winding and magnets)",
         ((1.0, {"speed": {"all": -0.5}, "electrical": {"all": 1.0}}), (0.4, {"electrical": {"all": 1.0}})),
         "more electrical power for the same speed and load, and less speed at one command",
-        "repeat after a pause",
-        "R = R0 (1 + 0.0039 dT)",
-        (0.03, 0.1),
+        "repeat after a pause", "R = R0 (1 + 0.0039 dT)", (0.03, 0.1),
     ),
     DriveLaw(
-        "motor",
-        "different motor, controller or setting",
-        (
-            (1.0, {"speed": {"all": 1.0}}), (1.0, {"electrical": {"all": 1.0}}), (0.5, {"speed": {"ramp": 1.0}}),
-            (0.5, {"electrical": {"ramp": 1.0}}),
-        ),
+        "motor", "different motor, controller or setting",
+        ((1.0, {"speed": {"all": 1.0}}), (1.0, {"electrical": {"all": 1.0}}), (0.5, {"speed": {"ramp": 1.0}}),
+         (0.5, {"electrical": {"ramp": 1.0}})),
         "speed at one command and electrical power change, loads at the measured speed are unchanged",
-        "compare motor, controller and its settings",
-        "shares of their own",
+        "compare motor, controller and its settings", "shares of their own",
     ),
 )  # fmt: skip
 """Causes behind the rotor."""

@@ -193,7 +193,7 @@ def _read(path: Path, how: _Recorded) -> dict[str, Array]:
     return {k: v[good] for k, v in columns.items() if np.isfinite(v[good]).any()}
 
 
-def _case_of_label(label: Mapping[str, Any]) -> str:
+def _case_of_label(label: Mapping[str, Any], name: str = "label") -> str:
     """Case of a label: an APC-like blade where nothing more is known."""
     fan = "chord_law" in label
     rotor: dict[str, Cell] = {"kind": "propeller", "blades": label["blades"], "hub_ratio": label.get("hub_ratio", 0.1)}
@@ -203,7 +203,7 @@ def _case_of_label(label: Mapping[str, Any]) -> str:
     section: dict[str, Cell] = {"camber": 0.05, "thickness": 0.09} if fan else {"camber": 0.04, "thickness": 0.10}
 
     operating = {"rpm": label["rpm"], "airspeed_m_s": 0.0}
-    return case_text("label", {"rotor": rotor, "blade": blade, "blade.section": section, "operating": operating,
+    return case_text(name, {"rotor": rotor, "blade": blade, "blade.section": section, "operating": operating,
                                "air": {"density_kg_m3": 1.2}}, "g")  # fmt: skip
 
 
@@ -427,26 +427,7 @@ def _tmotor() -> Iterator[Item]:
         yield _item(kind, "tmotor_28", columns, text, blade, [])
 
 
-_FAN = """schema = "bemt.case/1"
-name = "fan_76"
-[rotor]
-kind = "propeller"
-blades = 8
-diameter_mm = 76
-hub_ratio = 0.25
-[blade]
-pitch_mm = 70
-chord_law = "fan"
-max_chord_over_R = 0.35
-[blade.section]
-camber = 0.05
-thickness = 0.09
-[operating]
-rpm = 20000
-airspeed_m_s = 0
-[air]
-density_kg_m3 = 1.2
-"""
+_FAN = {"blades": 8, "diameter_mm": 76, "hub_ratio": 0.25, "pitch_mm": 70, "chord_law": "fan", "rpm": 20000}
 
 
 def _fan() -> Iterator[Item]:
@@ -464,7 +445,7 @@ def _fan() -> Iterator[Item]:
         keys = ("rpm", "thrust_N", "torque_Nm")
         run = np.concatenate([np.full(part["rpm"].size, float(k)) for k, part in enumerate(parts)])
         found[name] = {"run": run, **{k: np.concatenate([part[k] for part in parts]) for k in keys}}
-    yield _item("real duct", "fan_76", found["ducted"], _FAN, "", ["rpm"], found["open"])
+    yield _item("real duct", "fan_76", found["ducted"], _case_of_label(_FAN, "fan_76"), "", ["rpm"], found["open"])
 
 
 def draw_real(rng: np.random.Generator) -> list[Item]:
