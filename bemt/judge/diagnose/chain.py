@@ -247,7 +247,7 @@ def _settling(found: posterior.Evidence, decision: loss.Decision, best: fitting.
         faint = rivals_of(["", *singles][:_MOST_RIVALS])
         return suggestion.nothing_called_for(found, faint, found.probability[UNKNOWN])
     if decision.by == "files" and found.problem.other_setup:
-        return suggestion.Suggestion(ONE_SETUP, (), (), 0.0, 0.0, "cfd")
+        return suggestion.Suggestion(ONE_SETUP, "cfd")
     if decision.verdict == "insufficient" and (mend := other_rotor.to_mend(found.problem)):
         return suggestion.mended(found, mend)
     if other_rotor.doubted(found.problem, decision):
@@ -257,7 +257,7 @@ def _settling(found: posterior.Evidence, decision: loss.Decision, best: fitting.
     if by_law and (looked := suggestion.look(by_law[:1], found.problem.parts[0].record)):
         return looked
     if not singles:
-        return suggestion.Suggestion(suggestion.REFERENCE, (), (), 0.0, 0.0, "reference")
+        return suggestion.Suggestion(suggestion.REFERENCE, "reference")
     if decision.verdict == "insufficient" and (note := suggestion.weather(found)):
         return note
     sure = decision.effects[:1] if decision.beside else decision.effects
