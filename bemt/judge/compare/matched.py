@@ -63,8 +63,8 @@ class StandRun:
 
 def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> StandRun:
     """Reduce one recording for a comparison."""
-    units = {k: unit for k, unit in imported.units.items() if unit or k not in DIMENSIONLESS}
-    imported = replace(imported, units=units)  # a throttle has none
+    # a throttle has no unit
+    imported = replace(imported, units={k: u for k, u in imported.units.items() if u or k not in DIMENSIONLESS})
     one_rotor(imported, name)
     speed_in_doubt(imported, name)
     series, ramp = _reduced(imported, diameter_m)
@@ -77,13 +77,12 @@ def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> 
         values.pop("power_W", None)
     false = _misread(values)
     gone = sum(x.channel == "rpm" and x.reason.startswith("misread") for x in reduction(series).dropped)
-    every = int(np.isfinite(series.rpm).sum()) if "rpm" in series else 0
+    every = int(np.isfinite(series.values.get("rpm", np.nan)).sum())
     if false.any():
         values["rpm"] = np.where(false, np.nan, values["rpm"])
     constant = {k: float(imported.constants.get(k, math.nan)) for k in ("density_kg_m3", "diameter_m", "temperature_K")}
     rho, warm = (values.get(k, np.array([constant[k]])) for k in ("density_kg_m3", "temperature_K"))
     warm = warm[(warm > COLD) & (warm < HOT)]
-    zero = wind_of(imported)
     points = Dataset(
         series.kind, name, values, {k: series.u[k] for k in values if k in series},
         notes=(*ramp, *(n for n in series.notes if "no density" not in n)),
@@ -94,7 +93,7 @@ def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> 
         constant["diameter_m"] if diameter_m is None else diameter_m, float(warm.mean()) if warm.size else math.nan,
         {k: float(v["session"]) for k, v in reduction(series).correlated.items() if v.get("session")},
         conditions_of(imported), _shifts(series, bool(ramp)), (int(false.sum()) + gone, every + gone),
-        math.nan if zero is None else zero, cfd_setup.stated_setup(imported),
+        math.nan if (zero := wind_of(imported)) is None else zero, cfd_setup.stated_setup(imported),
     )  # fmt: skip
 
 

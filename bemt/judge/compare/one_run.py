@@ -24,14 +24,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of, number_text, speed_text, text_table
 from bemt.data.recordings.audit import AuditLine, combined
 from bemt.data.recordings.cfd_run import is_run, of_rotor, run_at
-from bemt.data.recordings.cfd_setup import (
-    audit_of,
-    conditions_of,
-    faults_first,
-    floor_note,
-    grid_floor,
-    stated_setup,
-)
+from bemt.data.recordings.cfd_setup import audit_of, conditions_of, faults_first, floor_note, grid_floor, stated_setup
 from bemt.data.recordings.channels import named
 from bemt.judge.compare.slips import KIND, LOADS, WIDE, LeftOpen, first_check, fluid_of
 from bemt.physics.dataset import Dataset

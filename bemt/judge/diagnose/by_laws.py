@@ -13,14 +13,7 @@ from bemt.base.arrays import Array
 from bemt.judge import loss
 from bemt.judge.compare import recordings
 from bemt.judge.compare.drive_laws import Judgement
-from bemt.judge.compare.matched import (
-    LOADS,
-    MARGIN,
-    SESSION,
-    density_change,
-    like_voltage,
-    losses_differ,
-)
+from bemt.judge.compare.matched import LOADS, MARGIN, SESSION, density_change, like_voltage, losses_differ
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import knowledge, posterior, signatures
 from bemt.judge.diagnose.assemble import assemble

@@ -224,8 +224,6 @@ def _commands(chosen: suggestion.Suggestion, given: suggestion.Given) -> tuple[s
         return (given.command(ruled_out=chosen.checks),)
     if chosen.kind == "air":
         return given.of_days()
-    if chosen.kind == "rotor":
-        return f"bemt lab calibrate-rotor REFERENCE {given.case}", given.command(reference="REFERENCE")
     if chosen.kind == "case":
         return (replace(given, case="--case LABEL").command(),)
     if chosen.kind == "mend":

@@ -15,14 +15,7 @@ from typing import TYPE_CHECKING, Any
 from bemt.base.action import Answered, Told
 from bemt.base.document import rows_of
 from bemt.base.errors import Fault, InputError, gathered, refuse
-from bemt.judge.compare.change_document import (
-    DIAGNOSED,
-    ComparedRuns,
-    RankedCause,
-    document,
-    next_step,
-    text,
-)
+from bemt.judge.compare.change_document import DIAGNOSED, ComparedRuns, RankedCause, document, next_step, text
 from bemt.judge.compare.matched import stand_run
 from bemt.judge.compare.recordings import RunChange
 from bemt.judge.compare.selection import Invocation, conditions_of, selected, with_air

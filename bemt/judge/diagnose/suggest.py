@@ -47,12 +47,6 @@ REFERENCE = (
 WHOSE = "state the rotor that was measured: its label, or its diameter, pitch and blades in the case"
 """Where another rotor fits the readings better than that of the case."""
 
-ROTOR = (
-    "measure diameter and pitch and count the blades; with a run that is known to be right, calibrate the rotor and "
-    "diagnose again with that run as reference"
-)
-"""What comes before any cause where all loads are off by a quarter."""
-
 # Tip Mach number from which incompressible flow is some per cent off.
 _COMPRESSIBLE = 0.3
 # Loads of a run and its reference that differ by such a share may be of days of different density.

@@ -126,8 +126,8 @@ def pair_files(a: str, b: str) -> dict[str, str] | None:
     found = {name: path for name, path in places if path.is_file()}
     if len(found) < len({a, b}):
         return None
-    texts = [_text(found[name], name) for name in (a, b)]
-    return {"reference.csv": texts[0], "recording.csv": texts[1], "compare": "A reference, B recording\n"}
+    return {"reference.csv": _text(found[a], a), "recording.csv": _text(found[b], b),
+            "compare": "A reference, B recording\n"}  # fmt: skip
 
 
 def _plain(path: Path, how: _Recorded) -> dict[str, Array]:
@@ -144,8 +144,7 @@ def _plain(path: Path, how: _Recorded) -> dict[str, Array]:
         }
     if how.half:
         command = next(iter(columns.values()))
-        drop = np.flatnonzero(np.diff(command) < 0.0)
-        top = int(drop[0]) + 1 if drop.size else command.size
+        top = next(iter(np.flatnonzero(np.diff(command) < 0.0) + 1), command.size)
         part = slice(0, top) if how.half == "up" else slice(top, None)
         columns = {k: v[part] for k, v in columns.items()}
     if "rpm" in columns:
@@ -188,8 +187,8 @@ def _read(path: Path, how: _Recorded) -> dict[str, Array]:
             columns["pulse_width_s" if run.command == "pwm_s" else run.command] = run.points.command
     n = next(iter(columns.values())).size
     columns |= {k: np.full(n, float(v)) for k, v in how.constant.items()}
-    load = [np.isfinite(columns[k]) for k in ("thrust_N", "torque_Nm") if k in columns]
-    good = np.any(load, axis=0) & np.isfinite(columns.get("rpm", np.ones(n)))
+    loads = [np.isfinite(columns[k]) for k in ("thrust_N", "torque_Nm") if k in columns]
+    good = np.any(loads, axis=0) & np.isfinite(columns.get("rpm", np.ones(n)))
     return {k: v[good] for k, v in columns.items() if np.isfinite(v[good]).any()}
 
 
