@@ -159,8 +159,7 @@ def _reduced(imported: Dataset, diameter_m: float | None) -> tuple[Dataset, tupl
     if slow is not None:
         rows = reduce(slow, diameter_m=diameter_m, steady=True)
         if steady is None or _useful(rows) > 2 * _useful(steady):
-            words = f"few steady points: {len(slow)} of {len(imported)} rows of a slow ramp are used as they are"
-            return rows, (words,)
+            return rows, (f"few steady points: {len(slow)} of {len(imported)} rows of a slow ramp are used as they are",)
     return steady or reduce(imported, diameter_m=diameter_m), ()
 
 

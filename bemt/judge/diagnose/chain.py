@@ -334,12 +334,10 @@ def partitions(problem: Problem, most: int = 6) -> list[tuple[str, NDArray[np.in
     return [(f"intervals of {name}", whole(rank * min(4, count) // count))]
 
 
-def held_out(
-    found: Evidence, what: Explanation, split: tuple[str, NDArray[np.intp]] | None = None
-) -> tuple[str, Array, Array]:
+def held_out(found: Evidence, what: Explanation) -> tuple[str, Array, Array]:
     """Predict every block from the others, with and without an explanation."""
     problem = found.problem
-    words, block = split or partitions(problem)[0]
+    words, block = partitions(problem)[0]
     member = block[problem.point]
     hyper = found.states[0].hyper
     C = noise.covariance(problem, hyper)

@@ -138,8 +138,7 @@ class Suggestion:
         """Plain values for JSON."""
         return {"text": self.text, "points": [dict(p) for p in self.points], "separates": list(self.separates),
                 "distance_before": self.before, "distance_after": self.after, "kind": self.kind,
-                "commands": list(self.commands), "checks": self.checks, "minutes": self.minutes,
-                "gain": self.gain,
+                "commands": list(self.commands), "checks": self.checks, "minutes": self.minutes, "gain": self.gain,
                 "otherwise": None if self.otherwise is None else self.otherwise.document()}  # fmt: skip
 
 
@@ -224,10 +223,8 @@ def _extended(alone: Problem, option: _Option) -> Problem:
     both = air_of_points({k: join([getattr(old.air, k), air[k]]) for k in air})
     plain = [e for e in part.baseline if not bem.acts_on_points(e)]
     flow = bem.flow_of(part.model.prepared(plain), rpm, V, both, extra, part.flow.chord)
-    filled = {}
-    for c, values in (("thrust_N", flow.T0), ("torque_Nm", flow.Q0)):
-        if c in old.measured:
-            filled[c] = join([old.measured[c], values[-option.rpm.size :]])
+    new = {"thrust_N": flow.T0, "torque_Nm": flow.Q0}
+    filled = {c: join([old.measured[c], v[-option.rpm.size :]]) for c, v in new.items() if c in old.measured}
     u = {c: join([old.u[c], np.full(option.rpm.size, np.nan)]) for c in filled}
     record = Record(old.name, rpm, V, both, filled, u, extra, old.gain, old.zero, old.air_recorded)
     return assemble((replace(part, record=record, flow=flow, _solved={}),), like=alone)
@@ -268,11 +265,9 @@ def _points(record: Record, option: _Option) -> tuple[dict[str, float], ...]:
     if option.change:
         changed = {"density_kg_m3": rho, "temperature_C": T - ZERO_CELSIUS, "pressure_Pa": rho * R_DRY * T}
     units = {"time_s": ("time_s", 1.0), "wall_distance_m": ("wall_distance_m", 1.0), "tip_gap_m": ("tip_gap_mm", 1e3)}
-    out = []
-    for k in range(option.rpm.size):
-        more = {new: float(option.extra[old][k]) * f for old, (new, f) in units.items() if old in option.extra}
-        out.append({"rpm": float(option.rpm[k]), "airspeed_m_s": float(option.V[k]), **changed, **more})
-    return tuple(out)
+    more = {new: option.extra[old] * f for old, (new, f) in units.items() if old in option.extra}
+    return tuple({"rpm": float(rpm), "airspeed_m_s": float(V), **changed, **{k: float(v[i]) for k, v in more.items()}}
+                 for i, (rpm, V) in enumerate(zip(option.rpm, option.V, strict=True)))  # fmt: skip
 
 
 def nothing_called_for(found: Evidence, rivals: Sequence[Rival], unknown: float) -> Suggestion:
@@ -402,9 +397,7 @@ def _choices(
     alone = found.problem if len(found.problem.parts) == 1 else assemble(found.problem.parts[:1])
     now = _distances(alone, effect, hyper)
 
-    def choice(
-        text: str, kind: str, plan: Problem, points: int, at: tuple[dict[str, float], ...] = ()
-    ) -> Suggestion:  # fmt: skip
+    def choice(text: str, kind: str, plan: Problem, points: int, at: tuple[dict[str, float], ...] = ()) -> Suggestion:
         there = _distances(plan, effect, hyper)
         told = np.sqrt(np.maximum(there**2 - now**2, 0.0))
         taken = float(np.sum(doubt * (1.0 - 2.0 * ndtr(-0.5 * told))))

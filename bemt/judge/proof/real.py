@@ -374,8 +374,7 @@ def _x22a() -> Iterator[Item]:
         return
     R = 1.0668
     shape = np.genfromtxt(root / "x22a_geometry.csv", delimiter=",", skip_header=1)
-    with (root / "x22a_measured_CT_CP_vs_J.csv").open(encoding="utf-8") as stream:
-        rows = np.array([[float(x) for x in row[:4]] for row in list(csv.reader(stream))[1:]])
+    rows = np.genfromtxt(root / "x22a_measured_CT_CP_vs_J.csv", delimiter=",", skip_header=1, usecols=range(4))
     rotor: dict[str, Cell] = {"kind": "propeller", "blades": 3, "diameter_m": 2 * R, "hub_ratio": 0.2}
     for angle in (19, 29):
         q = rows[rows[:, 0] == angle]
@@ -391,8 +390,7 @@ def _caradonna_tung() -> Iterator[Item]:
     root = find_data("caradonna_tung")
     if root is None:
         return
-    with (root / "caradonna_tung_CT_vs_tipMach.csv").open(encoding="utf-8") as stream:
-        rows = np.array([[float(x) for x in row[:4]] for row in list(csv.reader(stream))[1:]])
+    rows = np.genfromtxt(root / "caradonna_tung_CT_vs_tipMach.csv", delimiter=",", skip_header=1, usecols=range(4))
     r_R = np.linspace(0.18, 1.0, 10)
     rotor: dict[str, Cell] = {"kind": "propeller", "blades": 2, "diameter_m": 2.286, "hub_ratio": 0.17}
     for angle in np.unique(rows[:, 0]):
