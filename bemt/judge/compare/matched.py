@@ -71,8 +71,7 @@ def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> 
     values = {k: series[k] for k in _WANTED if k in series}
     _comparable(values, imported, name)
     command = next((k for k in ("pwm_s", "throttle") if k in series and moves(series[k])), "")
-    if command:
-        values["command"] = series[command]
+    values |= {"command": series[command]} if command else {}
     if "torque_Nm" in values:
         values.pop("power_W", None)
     false = _misread(values)
@@ -159,7 +158,8 @@ def _reduced(imported: Dataset, diameter_m: float | None) -> tuple[Dataset, tupl
     if slow is not None:
         rows = reduce(slow, diameter_m=diameter_m, steady=True)
         if steady is None or _useful(rows) > 2 * _useful(steady):
-            return rows, (f"few steady points: {len(slow)} of {len(imported)} rows of a slow ramp are used as they are",)
+            words = f"few steady points: {len(slow)} of {len(imported)} rows of a slow ramp are used as they are"
+            return rows, (words,)
     return steady or reduce(imported, diameter_m=diameter_m), ()
 
 
