@@ -21,7 +21,7 @@ from bemt.data.readers.cfd_run import RunToml, toml_text
 from bemt.data.recordings.cfd_run import assemble
 from bemt.data.recordings.cfd_setup import GRID_FLOOR, conditions_that_differ, grid_floor
 from bemt.data.recordings.load import import_files
-from bemt.judge.compare import one_run
+from bemt.judge.compare import one_run, slips
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case.load import Assumption
 from bemt.rotors.case.propagate import Moved
@@ -757,7 +757,7 @@ def _told(ratios: dict[str, list[float]], unit_open: frozenset[str] = frozenset(
 
     points = [one_run.PointOfRun("", 6000.0, 0.0, 1.2, 0.0, {k: load(v[i]) for k, v in ratios.items()}, ())
               for i in range(n)]  # fmt: skip
-    return one_run._sentence(points, "CFD", unit_open)
+    return one_run._sentence(points, "CFD", slips.LeftOpen(unit_open))
 
 
 def test_a_unit_is_named_only_where_it_was_open_and_fits_every_point() -> None:
@@ -787,10 +787,10 @@ def test_loads_that_are_off_by_one_factor_are_no_unit_of_one_of_them() -> None:
 
 def test_coefficients_have_no_unit() -> None:
     given = Dataset("bench", "a", {"CT": [0.1], "CP": [0.05]}, provenance={"format": "uiuc"})
-    assert not one_run.open_units(given)
+    assert not slips.open_units(given)
     stated = Dataset("bench", "a", {"thrust_N": [1.0], "torque_Nm": [1.0]},
                      provenance={"format": "table", "headings": {"thrust_N": "thrust [lbf]", "torque_Nm": "Q"}})  # fmt: skip
-    assert one_run.open_units(stated) == {"torque_Nm"}
+    assert slips.open_units(stated) == {"torque_Nm"}
 
 
 def test_a_point_near_zero_thrust_does_not_make_the_headline() -> None:
@@ -801,7 +801,7 @@ def test_a_point_near_zero_thrust_does_not_make_the_headline() -> None:
         return one_run.PointOfRun("", 6000.0, 0.0, 1.2, 0.0, {"thrust_N": load}, ())
 
     points = [*(point(5.0 + k, 5.1 + k) for k in range(7)), *(point(0.6, 0.05) for _ in range(3))]
-    told = one_run._sentence(points, "CFD")
+    told = one_run._sentence(points, "CFD", slips.LeftOpen())
     assert "agree in 7 of 10 values" in told and "-5 % of the largest thrust" in told and "9" not in told
 
 
@@ -817,7 +817,7 @@ def test_the_point_that_the_sentence_speaks_of_is_on_the_screen() -> None:
     for worst in range(12):
         points = _points([1.4 if k == worst else 1.0 for k in range(12)])
         found = one_run.RunComparison("run", "case", "cfd", {}, tuple(points), (), 0.0, {}, (),
-                                      one_run._sentence(points, "CFD"), "")  # fmt: skip
+                                      one_run._sentence(points, "CFD", slips.LeftOpen()), "")  # fmt: skip
         told = one_run.text(found)
         assert "+40 %" in told.splitlines()[0] and any("differs" in line for line in told.splitlines()[3:])
 

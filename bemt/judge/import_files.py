@@ -111,66 +111,72 @@ def import_(
     from bemt.base.given import paths_text
     from bemt.data.recordings import cfd_options, load
     from bemt.data.recordings.adapt import asked
-    from bemt.data.recordings.stated import filled, write_recording
+    from bemt.data.recordings.stated import filled
 
     if picture is not None and case is None:
         raise InputError(Fault("--picture", "", "no case", "--case CASE, whose band is drawn"))
     if picture is not None:
         kind_of(os.fspath(picture))
-    names, wrote, kept = paths_text("files", files, 1), "", ""
-    names = [f"{name}#{sheet}" for name in names] if sheet else names
+    names = [f"{name}#{sheet}" if sheet else name for name in paths_text("files", files, 1)]
     choice = asked(rpm, period_s, revolutions)
     load.check_format(format)
-    told: dict[str, list[str]] = {"unit": words(unit), "column": words(column), "sign": words(sign)}
-    run: dict[str, Any] = {"sector": sector, "zones": list(zones), "rotor_zones": list(rotor_zones), "axis": axis,
-           "airspeed_m_s": airspeed_m_s, "density_kg_m3": density_kg_m3, "reference": words(reference),
-           "setup": words(setup)}  # fmt: skip
+    columns = {"unit": words(unit), "column": words(column), "sign": words(sign)}
     left = [os.fspath(heading) for heading in ([ignore] if isinstance(ignore, str) else ignore)]
-    stated: dict[str, Any] = {}
-    of_tables = {"airspeed_m_s": airspeed_m_s, "density_kg_m3": density_kg_m3}
-    measured = not any(v for k, v in run.items() if k not in of_tables) and all(map(load.is_measured, names))
-    conditions = {**of_tables, "rpm": rpm if measured else None}
-    said: dict[str, list[Any]] = {**told, **{k.replace("_", "-"): [v] for k, v in conditions.items() if v is not None}}
-    run = run | dict.fromkeys(of_tables) if measured else run
-    lines, insist = [], any((*told.values(), *run.values(), left, out is not None, pole_pairs))
-    table = names[0] if len(names) == 1 and measured else ""
-    if insist and table and out is not None:
-        facts: dict[str, Any] = {**told, "pole_pairs": pole_pairs, "density_kg_m3": density_kg_m3, "ignore": left}
-        written = write_recording(table, os.fspath(out), rpm=rpm, airspeed_m_s=airspeed_m_s, **facts).as_posix()
-        kept, said = written, {}
-        names, told, out, left, insist = [written], dict.fromkeys(told, []), None, [], False
-    elif insist and measured and out is None:
-        facts = {**told, "pole_pairs": pole_pairs, "ignore": left}
-        stated = dict(zip(names, load.as_stated(names, facts), strict=True))
-        told, left, insist = dict.fromkeys(told, []), [], False
-    elif pole_pairs:
+    air = {"airspeed_m_s": airspeed_m_s, "density_kg_m3": density_kg_m3}
+    run: dict[str, Any] = {"sector": sector, "zones": list(zones), "rotor_zones": list(rotor_zones), "axis": axis,
+                           "reference": words(reference), "setup": words(setup)}  # fmt: skip
+    measured = not any(run.values()) and all(map(load.is_measured, names))
+    run |= {} if measured else air
+    insist = any((*columns.values(), *run.values(), left, out is not None, pole_pairs))
+    facts = {**columns, "pole_pairs": pole_pairs, "ignore": left}
+    table, stated = _tables(names, out, insist, {"rpm": rpm, **air}, facts) if measured else ("", {})
+    taken = bool(table or stated)  # then nothing that is stated is left to be applied
+    if pole_pairs and not taken:
         raise InputError(Fault("", "--pole-pairs", f"{pole_pairs} with these files", "one table of measurements"))
-    if measured and not kept and any(v is not None for v in of_tables.values()):
+    names = [table] if table else names
+    if measured and not table and any(v is not None for v in air.values()):
         with suppress(InputError):  # said where it is read
             read = {n: stated.get(n) or load.import_file(n, format, choice) for n in names}
-            stated |= {n: filled(one, **of_tables) for n, one in read.items()}
+            stated |= {n: filled(one, **air) for n, one in read.items()}
     speed = None if choice.period is None else 60.0 / choice.period
-    made = cfd_options.run_from(names, rpm=speed, revolutions=revolutions, **(run | told), ignore=left)
+    options = {} if taken else {**run, **columns, "ignore": left}
+    made = cfd_options.run_from(names, rpm=speed, revolutions=revolutions, **options)
     rotor = None if case is None else _rotor(case)
-    found = load.import_files(names, format, choice, made, insist, stated, rotor)
-    if out is not None and found.runs:
+    found = load.import_files(names, format, choice, made, insist and not taken, stated, rotor)
+    wrote, document, lines = "", found.document(), []
+    if out is not None and not table and found.runs:
         own = made.run.model_copy(update={"files": found.runs[-1].files})
         made = made.model_copy(update={"run": own})
         wrote = cfd_options.write_run(made, os.fspath(out)).as_posix()
-    document = found.document()
+    if table and not found.runs:
+        lines.append(f"{table} written\n")
     if case is not None:
         runs: list[Any] = [] if wrote else load.runs_of(names, made)[0]  # as the options say, not as the files do
         others = [f.path for f in found.files if f.record is None or f.record.kind != "cfd"] if runs else names
-        rest = [stated.get(name, name) for name in others]
-        seen = [wrote] if wrote else [*runs, *rest]
-        wind = None if measured else airspeed_m_s
-        sentence, document["prediction"] = _beside(seen, case, picture, rpm, wind, bool(wrote or runs))
+        seen = [wrote] if wrote else [*runs, *(stated.get(name, name) for name in others)]
+        told = {} if wrote or runs else {"rpm": rpm, **({} if measured else {"airspeed_m_s": airspeed_m_s})}
+        sentence, document["prediction"] = _beside(seen, case, picture, told)
         lines.append(f"{sentence}\n")
-    if kept and not found.runs:
-        lines.insert(0, f"{kept} written\n")
-    options: dict[str, list[Any]] = {"case": [str(case) if isinstance(case, str | os.PathLike) else "CASE"], **said}
-    text = "\n".join([*lines, found.text(wrote or (kept if found.runs else ""), options)])
+    again: dict[str, list[Any]] = {"case": [str(case) if isinstance(case, str | os.PathLike) else "CASE"]}
+    if not table:
+        of_tables = {"airspeed-m-s": airspeed_m_s, "density-kg-m3": density_kg_m3, "rpm": rpm if measured else None}
+        again |= {**columns, **{k: [v] for k, v in of_tables.items() if v is not None}}
+    text = "\n".join([*lines, found.text(wrote or (table if found.runs else ""), again)])
     return Told(document, text, exit_code=found.exit_code, complaints=found.complaints)
+
+
+def _tables(
+    names: Sequence[str], out: File | None, insist: bool, conditions: Mapping[str, Any], facts: Mapping[str, Any]
+) -> tuple[str, dict[str, Any]]:
+    """Tables of measurements as the user states them: one is kept, with the file that says so, others are read."""
+    from bemt.data.recordings import load
+    from bemt.data.recordings.stated import write_recording
+
+    if out is not None and len(names) == 1:
+        return write_recording(names[0], os.fspath(out), **conditions, **facts).as_posix(), {}
+    if out is None and insist:
+        return "", dict(zip(names, load.as_stated(names, facts), strict=True))
+    return "", {}
 
 
 def words(given: Mapping[str, str] | Sequence[str]) -> list[str]:
@@ -189,7 +195,7 @@ def _rotor(case: Propeller | File) -> tuple[float, float, bool]:
 
 
 def _beside(
-    files: Sequence[Any], case: object, picture: object, rpm: float | None, airspeed_m_s: float | None, stated: bool
+    files: Sequence[Any], case: object, picture: object, told: Mapping[str, float | None]
 ) -> tuple[str, Mapping[str, object]]:
     """How the files lie in the prediction band of the case: a sentence and a document; drawn where that is asked."""
     from bemt.base.canvas import kind_of
@@ -197,9 +203,8 @@ def _beside(
     from bemt.judge.diagnose.figures import first_picture
     from bemt.judge.diagnose.load import load_all
 
-    speed = [rpm] if rpm is not None and not stated else []
-    wind = [airspeed_m_s] if airspeed_m_s is not None and not stated else []
-    cases, records = load_all(files, [case], rpm=speed, airspeed_m_s=wind)
+    conditions: dict[str, Any] = {k: [v] for k, v in told.items() if v is not None}
+    cases, records = load_all(files, [case], **conditions)
     (view,) = first_picture(records, cases)
     if picture is not None:
         write_atomic(Path(str(picture)), view.picture(kind_of(str(picture))))

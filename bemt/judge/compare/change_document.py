@@ -14,8 +14,8 @@ import numpy as np
 from bemt import __version__
 from bemt.base.document import Documented
 from bemt.base.tables import number_text, or_null, text_table
-from bemt.base.unit_errors import SpeedRatio, speed_ratios
-from bemt.judge.compare.drive_laws import FAMILY, Judgement, law
+from bemt.base.unit_errors import speed_ratios
+from bemt.judge.compare.drive_laws import FAMILY, FAMILY_WORD, Judgement, check_of, title_of
 from bemt.judge.compare.matched import LOADS, WITHOUT_SPEED
 from bemt.judge.compare.recordings import (
     AS_RECORDED,
@@ -31,7 +31,6 @@ from bemt.judge.compare.selection import Invocation
 from bemt.judge.compare.smooth_change import Ratio
 from bemt.judge.explanation import Size
 from bemt.judge.loss import SPREAD, checks_by_worth, minutes
-from bemt.physics.effects import catalogue
 
 AIR_OF_BOTH = "--air-a TEMPERATURE,PRESSURE --air-b TEMPERATURE,PRESSURE"
 ONE_SETUP = "compute both with one set-up: before that no physics is named"
@@ -56,77 +55,86 @@ _STEPS = 2  # that are offered at once
 def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
     """Run or reading that would settle the answer, and the command to give then, with all that was asked."""
     said = change.leading
-    with_case = asked.command(case=asked.case or "CASE")
-    checks = {k: check for k in said.effects if (check := _check(k))}
-    loads = [r for r in change.ratios.values() if r.kind in LOADS]
-    apart = max((abs(math.log(r.ratio)) for r in loads), default=0.0)
-    days = math.isnan(change.density_ratio) and apart < _DAY and not (change.a.setup and change.b.setup)
     if change.other_setup and said.verdict in ("none", "insufficient"):
-        return {"text": ONE_SETUP, "command": ""}
-    if said.verdict == "none" and days and apart > _SEEN:
-        return {"text": DAYS, "command": asked.with_days()}
-    if said.verdict == "none":
-        text = "to see smaller changes, remove the propeller, mount it again and repeat each run once"
-        if change.a.setup and change.b.setup:
-            text = "to see smaller changes, compute both on a finer grid"
-        return {"text": text, "command": ""}
-    if said.why.startswith(_TOLD):
-        return {"text": "", "command": ""}
-    if said.verdict in ("named", "sensor"):
-        text = next(iter(checks.values()), "read the label of the channel")
-        return {"text": f"to be sure, {text}", "command": with_case}
+        text, command = ONE_SETUP, ""
+    elif said.verdict == "none":
+        text, command = _to_see_more(change, asked)
+    elif said.why.startswith(_TOLD):
+        text, command = "", ""
+    elif said.verdict in ("named", "sensor"):
+        check = next(filter(None, map(check_of, said.effects)), "read the label of the channel")
+        text, command = f"to be sure, {check}", asked.command(case=asked.case or "CASE")
+    else:
+        text, command = _lacking(change, asked) or _quickest_checks(change, asked)
+    return {"text": text, "command": command}
+
+
+def _of_days(change: RunChange, least: float) -> bool:
+    """Whether loads differ by this much, in ln, and no more than air of two days makes, which nobody has recorded."""
+    apart = max((abs(math.log(r.ratio)) for r in change.ratios.values() if r.kind in LOADS), default=-1.0)
+    return math.isnan(change.density_ratio) and least <= apart < _DAY and not (change.a.setup and change.b.setup)
+
+
+def _to_see_more(change: RunChange, asked: Invocation) -> tuple[str, str]:
+    """What shows a change that these runs do not show."""
+    if _of_days(change, _SEEN):
+        return DAYS, asked.with_days()
+    if change.a.setup and change.b.setup:
+        return "to see smaller changes, compute both on a finer grid", ""
+    return "to see smaller changes, remove the propeller, mount it again and repeat each run once", ""
+
+
+def _lacking(change: RunChange, asked: Invocation) -> tuple[str, str] | None:
+    """What the recordings lack before any cause can be told; None where they lack nothing."""
+    said, loads = change.leading, [r for r in change.ratios.values() if r.kind in LOADS]
     if said.why.endswith(IN_WIND):
-        letter = "a" if math.isfinite(change.a.zero_thrust_rpm) else "b"
-        air = getattr(asked, f"air_{letter}")
-        there = {f"air_{letter}": ",".join([*filter(None, [air]), "AIRSPEED"])}
-        text = f"state the airspeed of {letter.upper()}, with its unit as in 18m/s"
-        return {"text": text, "command": asked.command(**there)}
+        air = "air_a" if math.isfinite(change.a.zero_thrust_rpm) else "air_b"
+        command = asked.command(**{air: ",".join(filter(None, [getattr(asked, air), "AIRSPEED"]))})
+        return f"state the airspeed of {air[-1].upper()}, with its unit as in 18m/s", command
     if loads and all(r.extrapolated for r in loads):
         where = "where A was measured"
-        c = next(iter(change.loads_by_name.values()))
         if "rpm" in change.a.points:
+            c = next(iter(change.loads_by_name.values()))
             low, high = (math.exp(f(c.x[~c.second, 0])) for f in (np.min, np.max))
             where = f"at the speeds of A, {low:.0f} to {high:.0f} rev/min"
-        return {"text": f"run B again {where}, and at its airspeeds", "command": asked.command(b="B_AGAIN.csv")}
+        return f"run B again {where}, and at its airspeeds", asked.command(b="B_AGAIN.csv")
     if change.without_speed:
         text = "record the speed in both runs, headed rpm: at equal speed causes scale apart"
-        return {"text": text, "command": asked.command(a="A_WITH_RPM.csv", b="B_WITH_RPM.csv")}
+        return text, asked.command(a="A_WITH_RPM.csv", b="B_WITH_RPM.csv")
     if said.verdict in ("insufficient", "unknown") and (letter := _unrepeatable(change)):
-        run = change.a if letter == "a" else change.b
-        column = run.conditions[0] if run.conditions else "COLUMN"
-        others = f" (the file has {', '.join(run.conditions[:4])})" if run.conditions else ""
+        columns = (change.a if letter == "a" else change.b).conditions
+        others = f" (the file has {', '.join(columns[:4])})" if columns else ""
         text = f"choose the rows of {letter.upper()} in which nothing else changes{others}"
-        return {"text": text, "command": asked.with_rows(letter, column)}
+        return text, asked.with_rows(letter, columns[0] if columns else "COLUMN")
     likely = {k: p for k, p in said.probability.items() if k not in ("none", "unknown")}
-    density = likely.get("air_density", 0.0) * _FIRST >= max(likely.values(), default=1.0)
-    if density and loads and days:
-        return {"text": DAYS, "command": asked.with_days()}
+    if likely.get("air_density", 0.0) * _FIRST >= max(likely.values(), default=1.0) and _of_days(change, 0.0):
+        return DAYS, asked.with_days()
     if "torque" not in change.loads_by_name and change.loads is said:
         text = "record torque in both runs: thrust alone cannot tell gain, air and blade apart"
-        return {"text": text, "command": asked.command(a="A_WITH_TORQUE.csv", b="B_WITH_TORQUE.csv")}
-    again = asked.command(b="A_AGAIN.csv", rows_b=asked.rows_a, air_b=asked.air_a)
+        return text, asked.command(a="A_WITH_TORQUE.csv", b="B_WITH_TORQUE.csv")
+    return None
+
+
+def _quickest_checks(change: RunChange, asked: Invocation) -> tuple[str, str]:
+    """Checks that take away most doubt a minute, one of each family; or the run of A again."""
+    said = change.leading
+    members = [k for k in said.effects if check_of(k)]
     order = checks_by_worth(said.ranked, minutes("reference", len(change.a.points)))
     firsts: dict[str, str] = {}
-    for cause in [k for k in order if k in checks or said.verdict != "class"] or checks:  # the quickest of each family
-        firsts.setdefault(FAMILY.get(cause, cause), _check(cause) if cause else _REPEAT)
+    for cause in [k for k in order if k in members or said.verdict != "class"] or members:
+        firsts.setdefault(FAMILY.get(cause, cause), check_of(cause) if cause else _REPEAT)
     told = [*firsts.values()][:_STEPS] or [_REPEAT]
-    return {"text": "; or ".join(told), "command": again if told[0] == _REPEAT else with_case}
-
-
-def _check(name: str) -> str:
-    """Measurement that distinguishes a cause from others."""
-    row = law(name)
-    return row.settles if row is not None else catalogue()[name].check if name in catalogue() else ""
+    again = {"b": "A_AGAIN.csv", "rows_b": asked.rows_a, "air_b": asked.air_a}
+    command = asked.command(**again if told[0] == _REPEAT else {"case": asked.case or "CASE"})
+    return "; or ".join(told), command
 
 
 def _unrepeatable(change: RunChange) -> str:
     """Letter of the recording whose readings at one speed differ by more than those of any stand; "" where none do."""
-    for name in LOADS:
-        c = change.loads_by_name.get(name)
-        if c is not None:
-            for letter, here in (("b", c.second), ("a", ~c.second)):
-                if float(np.median(c.u[here])) > _RESTLESS:
-                    return letter
+    for c in change.loads_by_name.values():
+        for letter, here in (("b", c.second), ("a", ~c.second)):
+            if np.median(c.u[here]) > _RESTLESS:
+                return letter
     return ""
 
 
@@ -277,13 +285,6 @@ def text(doc: ComparedRuns, details: bool = False) -> str:
     return "\n".join(lines)
 
 
-_FAMILY_WORD = {
-    "blade": "another blade, pitch or diameter", "surroundings": "the surroundings of the rotor",
-    "airspeed": "the airspeed", "load cell": "a load cell", "drive": "the drive", "air_density": "the density",
-    "rpm_scale": "the speed reading", "unit_slip": "a unit",
-}  # fmt: skip
-
-
 def headline(doc: ComparedRuns) -> str:
     """What an engineer would say first."""
     effects, verdict = list(doc.effects), doc.verdict
@@ -344,16 +345,9 @@ def families(effects: Sequence[str], ranking: Sequence[RankedCause] = ()) -> str
     likely = {r.effect: r.probability for r in ranking}
     titles: dict[str, list[str]] = {}
     for k in effects:
-        if k not in _NO_CAUSE:
-            titles.setdefault(FAMILY.get(k, k), []).append(k)
-    families = sorted(titles, key=lambda f: -sum(likely.get(k, 0.0) for k in titles[f]))
-    return ", or ".join(_FAMILY_WORD.get(f, f) if len(titles[f]) > 1 else title_of(titles[f][0]) for f in families)
-
-
-def title_of(name: str) -> str:
-    """Title of a cause, or of a pair of them: of its scaling law, or of an effect that has none."""
-    rows = [(law(k) or catalogue().get(k), k) for k in name.split("+")]
-    return " and ".join(row.title if row else _FAMILY_WORD.get(k, k) for row, k in rows)
+        titles.setdefault(FAMILY.get(k, k), []).append(k)
+    order = sorted(titles, key=lambda f: -sum(likely.get(k, 0.0) for k in titles[f]))
+    return ", or ".join(FAMILY_WORD.get(f, f) if len(titles[f]) > 1 else title_of(titles[f][0]) for f in order)
 
 
 def _ends(r: Ratio, factor: float = 1.0) -> list[str]:
@@ -361,28 +355,12 @@ def _ends(r: Ratio, factor: float = 1.0) -> list[str]:
 
 
 def _said(doc: ComparedRuns) -> list[str]:
-    out = _of_loads({c: r for c, r in doc.ratios.items() if r.kind in ("thrust", "torque", *WITHOUT_SPEED)})
-    density, a, b = doc.density.ratio, doc.density.A, doc.density.B
-    if density and abs(density - 1.0) > 0.003:
-        ends = f"Recorded density: {a:.4g} to {b:.4g} kg/m3" if a and b else "Density from the recorded temperatures"
-        out.append(f"{ends} ({density - 1:+.1%}).")
+    """Sentences on loads, density, cause, drive and next step, with the command."""
     text, command = (doc.next_measurement.get(k) for k in ("text", "command"))
     told = (doc.told or ()) if doc.diagnosis else (sentence(doc),)
-    said_below = ("Next: ", "bemt ", "if ")
-    out += [t for t in told if not (text and t.lstrip().startswith(said_below))]
-    if not doc.diagnosis and "rpm_scale" in (*doc.effects, *_likely(doc)):
-        out += [
-            f"A miscount of {m.true}/{m.set} fits: in B, {m.words}; or the inverse in A." for m in _miscounts(doc)[:1]
-        ]
-    drive = doc.subsystems.get("drive")
-    if drive and drive.effects and drive.effects != doc.effects:
-        out.append(f"Drive: {drive.verdict}: {', '.join(title_of(k) for k in drive.effects)}.")
-    elif drive and doc.verdict != "none" and drive.verdict == "none":
-        moved = [r for r in doc.ratios.values() if r.over_command and not r.low95 < 1.0 < r.high95]
-        rest = "what load, voltage or a miscount explains" if moved else "scatter"
-        out.append(f"Drive: no change beyond {rest}.")
-    if text:
-        out.append(f"Next: {text}.")
+    below = ("Next: ", "bemt ", "if ") if text else ()
+    out = [*_of_loads(doc), *_of_density(doc.density), *(t for t in told if not t.lstrip().startswith(below)),
+           *_of_miscount(doc), *_of_drive(doc), *([f"Next: {text}."] if text else [])]  # fmt: skip
     out = [textwrap.fill(line, 110, initial_indent="  ", subsequent_indent="    ") for line in out]
     if command:
         out += [f"    {t.strip()}" for t in told if t.lstrip().startswith("if ")]
@@ -390,15 +368,37 @@ def _said(doc: ComparedRuns) -> list[str]:
     return out
 
 
-def _miscounts(doc: ComparedRuns) -> list[SpeedRatio]:
-    """Miscounts of the speed that move the loads as they moved, the commonest first."""
+def _of_density(density: Densities) -> list[str]:
+    if not density.ratio or abs(density.ratio - 1.0) <= 0.003:
+        return []
+    recorded = f"Recorded density: {density.A:.4g} to {density.B:.4g} kg/m3" if density.A and density.B else ""
+    return [f"{recorded or 'Density from the recorded temperatures'} ({density.ratio - 1:+.1%})."]
+
+
+def _of_miscount(doc: ComparedRuns) -> list[str]:
+    """The commonest miscount of the speed that moves the loads as they moved, where that is a likely cause."""
+    if doc.diagnosis or "rpm_scale" not in (*doc.effects, *_likely(doc)):
+        return []
     r = next((r for r in doc.ratios.values() if r.kind == "thrust"), None)
-    ends = (r.high95**-0.5, r.low95**-0.5) if r else (math.inf, 0.0)
-    return [m for m in speed_ratios(nearest=Fraction(8, 7)) if ends[0] < m.ratio < ends[1]]
+    low, high = (r.high95**-0.5, r.low95**-0.5) if r else (math.inf, 0.0)
+    fits = (m for m in speed_ratios(nearest=Fraction(8, 7)) if low < m.ratio < high)
+    return [f"A miscount of {m.true}/{m.set} fits: in B, {m.words}; or the inverse in A." for m in fits][:1]
 
 
-def _of_loads(loads: Mapping[str, Ratio]) -> list[str]:
+def _of_drive(doc: ComparedRuns) -> list[str]:
+    """What the drive says beside the answer."""
+    drive = doc.subsystems.get("drive")
+    if drive and drive.effects and drive.effects != doc.effects:
+        return [f"Drive: {drive.verdict}: {', '.join(title_of(k) for k in drive.effects)}."]
+    if drive and doc.verdict != "none" and drive.verdict == "none":
+        moved = any(r.over_command and not r.low95 < 1.0 < r.high95 for r in doc.ratios.values())
+        return [f"Drive: no change beyond {'what load, voltage or a miscount explains' if moved else 'scatter'}."]
+    return []
+
+
+def _of_loads(doc: ComparedRuns) -> list[str]:
     """How far the loads of B are from those of A."""
+    loads = {c: r for c, r in doc.ratios.items() if r.kind in ("thrust", "torque", *WITHOUT_SPEED)}
     if not loads:
         return []
     first, intervals = next(iter(loads.values())), _intervals(list(loads.values()))
@@ -412,9 +412,8 @@ def _of_loads(loads: Mapping[str, Ratio]) -> list[str]:
 
 def sentence(doc: ComparedRuns) -> str:
     """Verdict and reason."""
-    names = ", ".join(title_of(k) for k in doc.effects)
-    p = doc.probability
-    sure = f" (probability {p:.2f})" if p else ""
+    names = ", ".join(map(title_of, doc.effects))
+    sure = f" (probability {doc.probability:.2f})" if doc.probability else ""
     if doc.verdict == "none":
         return f"{doc.rule[0].upper()}{doc.rule[1:]}."
     if doc.verdict in ("named", "sensor"):
@@ -438,9 +437,10 @@ def _tables(doc: ComparedRuns) -> list[str]:
     out = []
     parts = {"": doc.ranking} if doc.diagnosis else {name: one.ranking for name, one in doc.subsystems.items()}
     for name, ranking in parts.items():
-        sizes = [", ".join(f"{k} {v.value:.4g}" for k, v in r.parameters.items() if isinstance(v.value, (int, float)))
-                 for r in ranking[:_ROWS]]  # fmt: skip
-        rows = [[r.effect, f"{r.probability:.3f}", size] for r, size in zip(ranking, sizes, strict=False)]
+        rows = []
+        for r in ranking[:_ROWS]:
+            sizes = (f"{k} {v.value:.4g}" for k, v in r.parameters.items() if isinstance(v.value, (int, float)))
+            rows.append([r.effect, f"{r.probability:.3f}", ", ".join(sizes)])
         if rows:
             out += ["", text_table([name or "explanation", "probability", "size"], rows, left=(0, 2), indent="  ")]
     return out

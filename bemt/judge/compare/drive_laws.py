@@ -22,6 +22,7 @@ from bemt.judge.compare.matched import FOLLOWS_LOAD, POWER_OF_SPEED, MatchedChan
 from bemt.judge.compare.smooth_change import Scatter
 from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation, KindPrior, Sizes
 from bemt.judge.loss import Decision, decide
+from bemt.physics.effects import catalogue
 from bemt.physics.effects.base import FORM
 
 PRIOR = KindPrior(none=0.7, single=0.2, pair=0.05, unknown=0.05)
@@ -52,6 +53,11 @@ FAMILY = {
     **dict.fromkeys(("battery_sag", "motor_heating", "motor"), "drive"),
 }  # fmt: skip
 """What an engineer would look at, at once; an effect that is not listed is a family of its own."""
+FAMILY_WORD = {
+    "blade": "another blade, pitch or diameter", "surroundings": "the surroundings of the rotor",
+    "airspeed": "the airspeed", "load cell": "a load cell", "drive": "the drive", "air_density": "the density",
+    "rpm_scale": "the speed reading", "unit_slip": "a unit",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,33 +100,23 @@ class DriveLaw:
 
 LAWS: tuple[DriveLaw, ...] = (
     DriveLaw(
-        "battery_sag",
-        "supply or battery voltage",
+        "battery_sag", "supply or battery voltage",
         ((1.0, {"speed": {"all": 1.0}}), (0.5, {"electrical": {"all": 1.0}})),
         "speed at one command follows the voltage; loads at the measured speed are unchanged",
-        "log voltage at the controller",
-        "n ~ command x V less I R",
-        (*_SIZES, 0.8),
+        "log voltage at the controller", "n ~ command x V less I R", (*_SIZES, 0.8),
     ),
     DriveLaw(
-        "motor_heating",
-        "motor heating (winding and magnets)",
+        "motor_heating", "motor heating (winding and magnets)",
         ((1.0, {"speed": {"all": -0.5}, "electrical": {"all": 1.0}}), (0.4, {"electrical": {"all": 1.0}})),
         "more electrical power for the same speed and load, and less speed at one command",
-        "repeat after a pause",
-        "R = R0 (1 + 0.0039 dT)",
-        (0.03, 0.1),
+        "repeat after a pause", "R = R0 (1 + 0.0039 dT)", (0.03, 0.1),
     ),
     DriveLaw(
-        "motor",
-        "different motor, controller or setting",
-        (
-            (1.0, {"speed": {"all": 1.0}}), (1.0, {"electrical": {"all": 1.0}}), (0.5, {"speed": {"ramp": 1.0}}),
-            (0.5, {"electrical": {"ramp": 1.0}}),
-        ),
+        "motor", "different motor, controller or setting",
+        ((1.0, {"speed": {"all": 1.0}}), (1.0, {"electrical": {"all": 1.0}}), (0.5, {"speed": {"ramp": 1.0}}),
+         (0.5, {"electrical": {"ramp": 1.0}})),
         "speed at one command and electrical power change, loads at the measured speed are unchanged",
-        "compare motor, controller and its settings",
-        "shares of their own",
+        "compare motor, controller and its settings", "shares of their own",
     ),
 )  # fmt: skip
 """Causes behind the rotor."""
@@ -130,6 +126,18 @@ _EACH = (1.0 - sum(_PRIOR.values())) / len(LAWS)
 def law(name: str) -> DriveLaw | None:
     """Row of a cause; None for effects on the rotor."""
     return next((row for row in LAWS if row.id == name), None)
+
+
+def title_of(name: str) -> str:
+    """Title of a cause, or of a pair of them: of its scaling law, or of an effect that has none."""
+    rows = [(law(k) or catalogue().get(k), k) for k in name.split("+")]
+    return " and ".join(row.title if row else FAMILY_WORD.get(k, k) for row, k in rows)
+
+
+def check_of(name: str) -> str:
+    """Measurement that distinguishes a cause from others."""
+    row = law(name)
+    return row.settles if row is not None else catalogue()[name].check if name in catalogue() else ""
 
 
 def _bases(c: MatchedChannel) -> dict[str, Array]:

@@ -63,54 +63,47 @@ class StandRun:
 
 def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> StandRun:
     """Reduce one recording for a comparison."""
-    units = {k: unit for k, unit in imported.units.items() if unit or k not in DIMENSIONLESS}
-    imported = replace(imported, units=units)  # a throttle has none
+    # a throttle has no unit
+    imported = replace(imported, units={k: u for k, u in imported.units.items() if u or k not in DIMENSIONLESS})
     one_rotor(imported, name)
     speed_in_doubt(imported, name)
     series, ramp = _reduced(imported, diameter_m)
     values = {k: series[k] for k in _WANTED if k in series}
-    if not {"thrust_N", "torque_Nm", "power_W"} & values.keys() and "rpm" not in values and "J" not in values:
-        if {"CT", "CP", "CQ"} & values.keys():
-            raise InputError(Fault(name, "", "coefficients without a speed", "J or rpm beside them"))
-        expected = f"thrust, torque or shaft power, with its unit{in_one_step(imported)}"
-        raise InputError(Fault(name, "", "no load and no speed", expected))
+    _comparable(values, imported, name)
     command = next((k for k in ("pwm_s", "throttle") if k in series and moves(series[k])), "")
-    if command:
-        values["command"] = series[command]
-    if "power_W" in values and "torque_Nm" in values:
-        del values["power_W"]
-    gone = [x for x in reduction(series).dropped if x.channel == "rpm" and x.reason.startswith("misread")]
+    values |= {"command": series[command]} if command else {}
+    if "torque_Nm" in values:
+        values.pop("power_W", None)
     false = _misread(values)
+    gone = sum(x.channel == "rpm" and x.reason.startswith("misread") for x in reduction(series).dropped)
+    every = int(np.isfinite(series.values.get("rpm", np.nan)).sum())
     if false.any():
         values["rpm"] = np.where(false, np.nan, values["rpm"])
-    constants = imported.constants
-    rho = values.get("density_kg_m3", np.full(1, np.nan))
-    density = float(np.nanmean(rho)) if np.isfinite(rho).any() else math.nan
-    if not math.isfinite(density):
-        density = float(constants.get("density_kg_m3", math.nan))
-    diameter = diameter_m if diameter_m is not None else float(constants.get("diameter_m", math.nan))
-    warm = values.get("temperature_K", np.array([constants.get("temperature_K", math.nan)]))
+    constant = {k: float(imported.constants.get(k, math.nan)) for k in ("density_kg_m3", "diameter_m", "temperature_K")}
+    rho, warm = (values.get(k, np.array([constant[k]])) for k in ("density_kg_m3", "temperature_K"))
     warm = warm[(warm > COLD) & (warm < HOT)]
+    points = Dataset(
+        series.kind, name, values, {k: series.u[k] for k in values if k in series},
+        notes=(*ramp, *(n for n in series.notes if "no density" not in n)),
+        units={"command": "s" if command == "pwm_s" else "-"},
+    )  # fmt: skip
     return StandRun(
-        Dataset(
-            series.kind,
-            name,
-            values,
-            {k: series.u[k] for k in values if k in series},
-            notes=(*ramp, *(n for n in series.notes if "no density" not in n)),
-            units={"command": "s" if command == "pwm_s" else "-"},
-        ),
-        command,
-        density,
-        diameter,
-        float(warm.mean()) if warm.size else math.nan,
+        points, command, float(np.nanmean(rho)) if np.isfinite(rho).any() else constant["density_kg_m3"],
+        constant["diameter_m"] if diameter_m is None else diameter_m, float(warm.mean()) if warm.size else math.nan,
         {k: float(v["session"]) for k, v in reduction(series).correlated.items() if v.get("session")},
-        conditions_of(imported),
-        _shifts(series, bool(ramp)),
-        (int(false.sum()) + len(gone), (int(np.isfinite(series.rpm).sum()) if "rpm" in series else 0) + len(gone)),
-        math.nan if (zero := wind_of(imported)) is None else zero,
-        cfd_setup.stated_setup(imported),
-    )
+        conditions_of(imported), _shifts(series, bool(ramp)), (int(false.sum()) + gone, every + gone),
+        math.nan if (zero := wind_of(imported)) is None else zero, cfd_setup.stated_setup(imported),
+    )  # fmt: skip
+
+
+def _comparable(values: Mapping[str, Array], imported: Dataset, name: str) -> None:
+    """Refuse a recording in which nothing can be compared."""
+    if {"thrust_N", "torque_Nm", "power_W", "rpm", "J"} & values.keys():
+        return
+    if {"CT", "CP", "CQ"} & values.keys():
+        raise InputError(Fault(name, "", "coefficients without a speed", "J or rpm beside them"))
+    expected = f"thrust, torque or shaft power, with its unit{in_one_step(imported)}"
+    raise InputError(Fault(name, "", "no load and no speed", expected))
 
 
 def _misread(values: Mapping[str, Array]) -> NDArray[np.bool_]:
@@ -196,16 +189,13 @@ def _ramp(imported: Dataset) -> Dataset | None:
         return None
     if t is None:
         return imported
-    speed = np.where(rpm > 0.0, np.log(np.where(rpm > 0.0, rpm, 1.0)), np.nan)
-    half = _WINDOW // 2
-    padded = np.pad(speed, half, constant_values=np.nan)
-    windows = np.lib.stride_tricks.sliding_window_view(padded, _WINDOW)
+    speed, half = np.where(rpm > 0.0, np.log(np.where(rpm > 0.0, rpm, 1.0)), np.nan), _WINDOW // 2
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(speed, half, constant_values=np.nan), _WINDOW)
     with np.errstate(all="ignore"):
         full = np.isfinite(windows).sum(axis=1) > half
         middle = np.array([np.nanmedian(w) if ok else np.nan for w, ok in zip(windows, full, strict=True)])
-        far = np.array(
-            [np.nanmedian(np.abs(w - m)) if ok else np.nan for w, m, ok in zip(windows, middle, full, strict=True)]
-        )
+        rest = np.abs(windows - middle[:, None])
+        far = np.array([np.nanmedian(w) if ok else np.nan for w, ok in zip(rest, full, strict=True)])
         rate = np.abs(np.gradient(middle, t))
     keep = np.isfinite(middle) & (np.abs(speed - middle) < _JUMP) & (far < _JUMP) & (rate < _RATE)
     return imported.select(keep) if keep.sum() >= _ROWS else None
@@ -380,48 +370,32 @@ def _averaged(part: _Readings) -> _Readings:
     return replace(part, y=mean(part.y), x=x, floor=mean(part.floor), u=mean(part.u), run=mean(part.run))
 
 
-def matched(a: StandRun, b: StandRun, name: str, diameter: float = math.nan) -> MatchedChannel | None:
+def matched(a: StandRun, b: StandRun, name: str, diameter: float) -> MatchedChannel | None:
     """Bring one channel of two recordings together."""
-    choices = {**LOADS, **DRIVE}.get(name, ("thrust_N",))
     if name in OVER_COMMAND and (a.command != b.command or not a.command):
         return None
-    able = [c for c in choices if name not in LOADS or c != "electrical_power_W" or like_voltage(a, b)]
-    tried = ((c, _readings(a, name, c, diameter), _readings(b, name, c, diameter)) for c in able)
-    channel, one, two = next((t for t in tried if None not in t), ("", None, None))
-    if one is None or two is None:
+    for channel in {**LOADS, **DRIVE}.get(name, ("thrust_N",)):
+        one, two = (_readings(run, name, channel, diameter) for run in (a, b))
+        alike = name not in LOADS or channel != "electrical_power_W" or like_voltage(a, b)
+        if one and two and alike:
+            break
+    else:
         return None
     turned = one.sign != two.sign
     notes = [f"{channel}: changed sign between A and B; sizes are compared"] if turned else []
-    parts = [_averaged(one), _averaged(two)]
-    for part, run, letter in zip(parts, (a, b), "AB", strict=True):
-        if part.lost > 0.5 * len(run):
-            notes.append(f"{channel}: {part.lost} of {len(run)} points of {letter} left out: near zero")
+    notes += [f"{channel}: {part.lost} of {len(run)} points of {letter} left out: near zero"
+              for part, run, letter in ((one, a, "A"), (two, b, "B")) if part.lost > 0.5 * len(run)]  # fmt: skip
+    one, two = _averaged(one), _averaged(two)
     log_density, unsure = density_change(a, b) if name in LOADS and channel not in _COEFFICIENTS else (0.0, 0.0)
-    shift = [0.0, log_density]
-    codes = [np.unique(p.run, return_inverse=True)[1] for p in parts]
-    codes[1] = codes[1] + codes[0].max() + 1
-    seen = [r.session.get(channel, 0.0) for r in (a, b)]
+    runs, more = (np.unique(part.run, return_inverse=True)[1] for part in (one, two))
+    seen = [run.session.get(channel, 0.0) for run in (a, b)]
+    x, floor, u = (np.concatenate([getattr(part, k) for part in (one, two)]) for k in ("x", "floor", "u"))
+    shift = np.repeat([run.shift.get(channel, 0.0) for run in (a, b)], [one.y.size, two.y.size])
     return MatchedChannel(
-        name,
-        channel,
-        np.concatenate([p.y - s for p, s in zip(parts, shift, strict=True)]),
-        np.concatenate([p.x for p in parts]),
-        np.repeat([False, True], [p.y.size for p in parts]),
-        np.concatenate(codes),
-        np.concatenate([p.floor for p in parts]),
-        np.concatenate([p.u for p in parts]),
-        log_density,
-        math.hypot(max(_set_up(name, channel, a, b), *seen), unsure),
-        tuple(notes),
-        np.repeat([a.shift.get(channel, 0.0), b.shift.get(channel, 0.0)], [p.y.size for p in parts]),
-        turned,
-    )
-
-
-def log_range(x: Array, margin: float) -> tuple[float, float]:
-    """Range of a coordinate, widened by a margin of its width."""
-    wider = margin * max(float(np.ptp(x)), 1e-12)
-    return float(x.min()) - wider, float(x.max()) + wider
+        name, channel, np.concatenate([one.y, two.y - log_density]), x,
+        np.repeat([False, True], [one.y.size, two.y.size]), np.concatenate([runs, more + runs.max() + 1]), floor, u,
+        log_density, math.hypot(max(_set_up(name, channel, a, b), *seen), unsure), tuple(notes), shift, turned,
+    )  # fmt: skip
 
 
 def density_change(a: StandRun, b: StandRun) -> tuple[float, float]:

@@ -19,25 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import __version__
-from bemt.base import unit_errors
 from bemt.base.document import Documented
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of, number_text, speed_text, text_table
 from bemt.data.recordings.audit import KEYS, AuditLine, combined
 from bemt.data.recordings.cfd_run import is_run, of_rotor, run_at
-from bemt.data.recordings.cfd_setup import (
-    Elsewhere,
-    audit_of,
-    conditions_of,
-    faults_first,
-    floor_note,
-    grid_floor,
-    stated_setup,
-)
-from bemt.data.recordings.channels import named, without_unit
-from bemt.data.recordings.slips import NEAR
+from bemt.data.recordings.cfd_setup import audit_of, conditions_of, faults_first, floor_note, grid_floor, stated_setup
+from bemt.data.recordings.channels import named
+from bemt.judge.compare.slips import KIND, LOADS, WIDE, LeftOpen, first_check, fluid_of
 from bemt.physics.dataset import Dataset
-from bemt.rotors.as_measured import FACTOR
 from bemt.rotors.case import Case
 from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.case.propagate import Moved, propagate
@@ -45,15 +35,10 @@ from bemt.rotors.conditioning import STAND
 from bemt.rotors.propeller import rotor_of
 
 SCHEMA = "bemt.run-comparison/1"
-_LOADS = {"thrust_N": "thrust [N]", "torque_Nm": "torque [N m]", "duct_share": "duct's share"}
 STAND_U = dict(zip(("thrust_N", "torque_Nm"), STAND.tolist(), strict=True))
 """Standard uncertainty of a load that a stand does not state, over its size [1]."""
-_KIND = {"thrust_N": "force", "torque_Nm": "torque"}
 _ROWS = 6  # points on one screen
-_WIDE = 2.0  # combined standard uncertainties within which nothing is shown to differ
 _NEAR_ZERO = 0.1  # share of the largest value of a load below which a difference has no per cent
-_FAR = 1.5  # ratio of the loads beyond which a slip is likelier than physics
-_FLUIDS = {"water": 998.0, "air": 1.225, "a fluid of 1 kg/m3": 1.0}  # 1: what incompressible solvers have at first
 _NO_DENSITY = re.compile(r"density: not stated")
 _NAMES = {"program": "", "cells": "cells", "grid_level": "grid", "turbulence": "", "solver": "", "domain": "domain"}
 
@@ -163,16 +148,8 @@ def compare_run(
     name = os.fspath(path) if not isinstance(path, Dataset) else path.file or path.name
     made = rotor_of(case).case
     points, imported = cfd_points(name, given, (made.diameter_m, float(made.air().rho), made.ducted))
-    notes, points_stated = list(points.notes), {*points.values}
-    for channel, words, value in (
-        ("rpm", "rev/min", made.rpm),
-        ("airspeed_m_s", "m/s", made.airspeed_m_s),
-        ("density_kg_m3", "kg/m3", made.air().rho),
-    ):
-        if channel not in points and not (channel == "airspeed_m_s" and "J" in points):
-            notes.append(f"{channel.split('_')[0]}: not stated; {value:.6g} {words} of the case")
-            points = replace(points, values={**points.values, channel: np.full(len(points), float(value))})
-    full = points.derive(made.diameter_m)
+    completed, of_case = _completed(points, made)
+    full = completed.derive(made.diameter_m)
     keep = np.any([np.isfinite(full[k]) for k in ("thrust_N", "torque_Nm") if k in full], axis=0)
     rows = np.flatnonzero(keep & np.isfinite(full.rpm))
     if not rows.size:
@@ -182,43 +159,56 @@ def compare_run(
         made, full.rpm[rows], full.airspeed_m_s[rows], full.density_kg_m3[rows],
         angle_deg=_angle(full, rows, made, name), progress=step,
     )  # fmt: skip
-    solved = whole.points
     computed = imported.kind == "cfd" or bool(stated_setup(imported))
-    if not computed and (open_u := [k for k in STAND_U if k in full and np.isnan(full.u[k][rows]).any()]):
-        usual = ", ".join(f"{k.rsplit('_', 1)[0]} {STAND_U[k]:.0%}" for k in open_u)
-        notes.insert(
-            0,
-            f"u of the recording: not stated; that of a stand which nobody calibrated, {usual} "
-            "(a computed table says so by a column turbulence, cells or solver)",
-        )
-        stand = {k: np.where(np.isnan(full.u[k]), STAND_U[k] * np.abs(full[k]), full.u[k]) for k in open_u}
-        full = replace(full, u={**full.u, **stand})
-    out = tuple(_point(full, solved, int(i), k) for k, i in enumerate(rows))
-    if made.ducted and computed and "thrust_N" in full and "duct_thrust_N" not in full:
-        notes.append(f"thrust: no part of the duct stated; taken for the whole. The rotor's alone is "
-                     f"{float(solved.rotor_thrust_N[0]):.4g} N by BEMT; --zones says what counts")  # fmt: skip
     lines: list[AuditLine] = []
+    of_u, of_duct = [], []
     if computed:
-        at = int(rows[0])
         pitch = float(prepare_case(made, oblique=True).pitch_m)
         lines = [*audit_of(imported if len(imported) == len(full) else full, made.diameter_m, pitch, made.ducted,
-                           float(made.air().a_sound), at)]  # fmt: skip
+                           float(made.air().a_sound), int(rows[0]))]  # fmt: skip
+        flies = full.airspeed_m_s[rows] > 0.5
         if not is_run(imported):
-            flies = full.airspeed_m_s[rows] > 0.5
-            notes.insert(0, "u of the file, and " + floor_note(bool(flies.any()), bool(flies.all())))
-    notes = [*made.as_built().no_check, *notes]
-    known = combined(lines)[1] if lines else math.nan
+            of_u = ["u of the file, and " + floor_note(bool(flies.any()), bool(flies.all()))]
+        if made.ducted and "thrust_N" in full and "duct_thrust_N" not in full:
+            of_duct = [f"thrust: no part of the duct stated; taken for the whole. The rotor's alone is "
+                       f"{float(whole.points.rotor_thrust_N[0]):.4g} N by BEMT; --zones says what counts"]  # fmt: skip
+    else:
+        full, of_u = _with_u_of_stand(full, rows)
+    out = tuple(_point(full, whole.points, int(i), k) for k, i in enumerate(rows))
+    notes = dict.fromkeys([*made.as_built().no_check, *of_u, *points.notes, *of_case, *of_duct])
     asked = called or (made.path.as_posix() if isinstance(case, Case) else os.fspath(case))
     return RunComparison(
         name, made.name, "cfd" if computed else "bench", {k: ", ".join(v) for k, v in conditions_of(imported).items()},
-        out, tuple(faults_first(lines)), known, dict(imported.averaged) if is_run(imported) else {},
-        tuple(dict.fromkeys(notes)),
-        _sentence(out, "CFD" if computed else "Recording", open_units(imported),
-                  imported.elsewhere if is_run(imported) else (),
-                  "density_kg_m3" not in points_stated and not points_stated.isdisjoint(_KIND),
-                  without_unit(points)),
+        out, tuple(faults_first(lines)), combined(lines)[1] if lines else math.nan,
+        dict(imported.averaged) if is_run(imported) else {}, tuple(notes),
+        _sentence(out, "CFD" if computed else "Recording", LeftOpen.of(points, imported)),
         _next(out, lines, name, asked, whole.moved),
     )  # fmt: skip
+
+
+def _completed(points: Dataset, case: Case) -> tuple[Dataset, list[str]]:
+    """Points with what they do not state taken from the case, and notes that say so."""
+    notes, values = [], dict(points.values)
+    of_case = {"rpm": (case.rpm, "rev/min"), "airspeed_m_s": (case.airspeed_m_s, "m/s"),
+               "density_kg_m3": (case.air().rho, "kg/m3")}  # fmt: skip
+    for channel, (value, unit) in of_case.items():
+        if channel not in points and not (channel == "airspeed_m_s" and "J" in points):
+            notes.append(f"{channel.split('_')[0]}: not stated; {value:.6g} {unit} of the case")
+            values[channel] = np.full(len(points), float(value))
+    return replace(points, values=values), notes
+
+
+def _with_u_of_stand(points: Dataset, rows: NDArray[np.intp]) -> tuple[Dataset, list[str]]:
+    """A recording with the uncertainty of a usual stand where it states none, and the note of that."""
+    missing = [k for k in STAND_U if k in points and np.isnan(points.u[k][rows]).any()]
+    if not missing:
+        return points, []
+    usual = ", ".join(f"{LOADS[k][0]} {STAND_U[k]:.0%}" for k in missing)
+    u = {k: np.where(np.isnan(points.u[k]), STAND_U[k] * np.abs(points[k]), points.u[k]) for k in missing}
+    return replace(points, u={**points.u, **u}), [
+        f"u of the recording: not stated; that of a stand which nobody calibrated, {usual} "
+        "(a computed table says so by a column turbulence, cells or solver)"
+    ]
 
 
 def _angle(points: Dataset, rows: NDArray[np.intp], case: Case, name: str) -> NDArray[np.float64]:
@@ -261,159 +251,60 @@ def _load(value: float, u: float, bemt: Dataset, name: str, k: int) -> BothLoads
 def _verdict(E: float, u: float) -> str:
     if not math.isfinite(E + u):
         return "no result"
-    return "agrees" if abs(E) <= u else "within 2 u" if abs(E) <= _WIDE * u else "differs"
+    return "agrees" if abs(E) <= u else "within 2 u" if abs(E) <= WIDE * u else "differs"
 
 
-def other_fluid(off: Sequence[float], u: Sequence[float], density: float) -> str:
-    """In which other fluid all loads would be as a model has them; "" where none is nearer by half, within two u.
-
-    ``off``: loads of the run over the model's, natural logarithm; ``u``: their standard uncertainty [1].
-    """
-    y, wide = np.array(off), np.array(u)
-    for words, other in _FLUIDS.items():
-        far = math.log(other / density)
-        if y.size and np.all(np.abs(y - far) < np.minimum(0.5 * np.abs(y), _WIDE * wide)):
-            return f"All loads are about {math.exp(far):.3g} times BEMT's, as in {words}: first check the density"
-    return ""
-
-
-def _fluid(loads: Sequence[BothLoads], density: float) -> str:
-    """What all loads look like if the run is of another density than was taken; "" where none brings them near."""
-    said = [load for load in loads if load.cfd and load.bemt and math.isfinite(load.u_both)]
-    off = [math.log(max(load.cfd / load.bemt, 1e-9)) for load in said]
-    found = other_fluid(off, [_share(load) for load in said], density)
-    return f" {found}." if found else ""
-
-
-def _share(load: BothLoads) -> float:
-    """Both bands over the loads, [1]."""
-    return math.hypot(np.nan_to_num(load.u_cfd, posinf=0.0) / load.cfd, load.u_bemt / load.bemt, 0.02)
-
-
-def _slip(
-    name: str, loads: Sequence[BothLoads], unit_open: bool | None, density_open: bool = False
-) -> tuple[float, str]:
-    """What a difference looks like that is no physics, and how little it fits; "" when nothing is near.
-
-    ``unit_open``: whether the unit is not stated; None of a coefficient, which has none.
-    """
-    said = [load for load in loads if load.cfd and load.bemt and math.isfinite(load.u_both)]
-    if not said:
-        return math.inf, ""
-    if all(load.cfd * load.bemt < 0.0 for load in said):
-        return 0.0, f" The signs are opposite: look at the sign of the {name.split('_')[0]}."
-    off = np.array([load.cfd / load.bemt for load in said])
-    if name not in _KIND or np.any(off <= 0.0) or 1.0 / _FAR < float(np.median(off)) < _FAR:
-        return math.inf, ""
-    wide = np.array([_share(load) for load in said])
-    # no rotor of the case is off by FACTOR: then even a unit that is stated may be wrong
-    errors = () if unit_open is None else unit_errors.errors(_KIND[name])
-    may = (e for e in errors if unit_open or max(e.factor, e.repair) > FACTOR)
-    near = [(e.rarity + float(np.mean(far**2)), e) for e in may
-            if np.all((far := np.abs(np.log(off / e.factor)) / wide) < 1.0)]  # fmt: skip
-    if not near:
-        return math.inf, (
-            f" First check {'unit, ' if unit_open else ''}{'density, ' if density_open else ''}sector, zones and speed."
-        )
-    score, error = min(near, key=lambda item: item[0])
-    size = max(error.factor, error.repair)
-    return score, (f" {name.split('_')[0].capitalize()} is off by about a factor of {size:.4g}, as of {error.actual} "
-                   f"taken for {error.stated}: check the unit.")  # fmt: skip
-
-
-def _one_factor(loads: Mapping[str, Sequence[BothLoads]], units_open: Collection[str]) -> str:
-    """What to check first where thrust and torque are off by one factor, which no unit of one explains; else ""."""
-    ratio = [np.array([v.cfd / v.bemt for v in loads.get(k, ()) if v.cfd and v.bemt]) for k in _KIND]
-    if not all(r.size and np.all(r > 0.0) for r in ratio):
-        return ""
-    thrust, torque = (float(np.median(np.log(r))) for r in ratio)
-    both = 0.5 * (thrust + torque)
-    if abs(both) < math.log(_FAR) or abs(thrust - torque) > NEAR:
-        return ""
-    # loads go with the square of the speed
-    speed = next((f"the speed, as of {e.actual} taken for {e.stated}" for e in unit_errors.errors("rotation")
-                  if abs(both + 2.0 * math.log(e.factor)) <= NEAR), "speed, sector, density and diameter")  # fmt: skip
-    units = ", then the units" if set(_KIND) <= set(units_open) else ""
-    return f" Both loads are off by about a factor of {math.exp(abs(both)):.3g}: first check {speed}{units}."
-
-
-def open_units(imported: Dataset) -> frozenset[str]:
-    """Loads whose unit the file did not state; coefficients have none."""
-    if is_run(imported):
-        return frozenset(k for k in _KIND if k.split("_")[0] in imported.units_given)
-    told = imported.headings
-    return frozenset(k for k in _KIND if k in imported.values and not re.search(r"[\[(].+[\])]", told.get(k, "")))
-
-
-def _not_counted(channel: str, loads: Sequence[BothLoads], elsewhere: Sequence[Elsewhere]) -> str:
-    """What the files hold beside a load that brings it nearer to the model by half or more; "" without it."""
-    ratio = [abs(load.cfd / load.bemt) for load in loads if load.cfd and load.bemt]
-    off = np.abs(np.log(ratio)) if ratio else np.zeros(1)
-    for e in elsewhere:
-        if e.channel == channel and 0.0 < e.factor < math.inf and ratio:
-            if float(np.median(np.abs(np.log(ratio) + math.log(e.factor)))) < 0.5 * float(np.median(off)):
-                value, unit = loads[0].cfd * e.factor, _LOADS[channel].split("[")[1].rstrip("]")
-                said, what = channel.split("_")[0].capitalize(), "axis" if e.words.startswith("along") else "zones"
-                return f" {said} {e.words} is {number_text(value, 4)} {unit}: check the {what}."
-    return ""
-
-
-def _sentence(
-    points: Sequence[PointOfRun], who: str, units_open: Collection[str] = (), elsewhere: Sequence[Elsewhere] = (),
-    density_open: bool = False, unitless: Collection[str] = (),
-) -> str:  # fmt: skip
+def _sentence(points: Sequence[PointOfRun], who: str, open_: LeftOpen) -> str:
+    """That loads differ and what to check first, that the bands are too wide to say, or that they agree."""
     every = [(k, load) for p in points for k, load in p.loads.items()]
-    off = [(k, load) for k, load in every if load.verdict == "differs"]
-    near = [(k, load) for k, load in every if load.verdict == "within 2 u"]
-    fluid = _fluid([load for k, load in every if k in _KIND], points[0].density_kg_m3) if density_open else ""
-    lost = sum(load.verdict == "no result" for _, load in every)
-    tail = f" No result for {number_of(lost, 'value')}." if lost else ""
+    off, near, lost = ([(k, load) for k, load in every if load.verdict == verdict]
+                       for verdict in ("differs", "within 2 u", "no result"))  # fmt: skip
+    tail = f" No result for {number_of(len(lost), 'value')}." if lost else ""
+    fluid = fluid_of([load for k, load in every if k in KIND], points[0].density_kg_m3) if open_.density else ""
     top = {k: max(abs(load.cfd) for name, load in every if name == k) for k, _ in every}
-    agree = len(every) - len(off) - len(near) - lost
     if off:
-        k, load = max(off, key=lambda x: x[1].times)
-        loads = {name: [v for n, v in every if n == name] for name, _ in off}
-        if left := [words for name, own in loads.items() if (words := _not_counted(name, own, elsewhere))]:
-            tail += "".join(left)
-        elif words := fluid or _one_factor(loads, units_open):
-            tail += words
-        else:
-            slips = [_slip(name, own, None if name in unitless else name in units_open, density_open)
-                     for name, own in loads.items()]  # fmt: skip
-            said = [slip for slip in slips if slip[1]]  # a unit explains all that differs, or nothing
-            tail += min(said, key=lambda slip: (math.isfinite(slip[0]), slip[0]))[1] if said else ""
+        loads = {name: [load for k, load in every if k == name] for name, _ in off}
         share = f" in {len(off)} of {len(every)} values" if len(every) > 1 else ""
-        near_zero = abs(load.cfd) < _NEAR_ZERO * top[k]  # there the value is no measure of the difference
-        share_of = f"{100.0 * load.difference / top[k]:+.0f} % of the largest" if near_zero else load.percent
-        at = next(p for p in points if load in p.loads.values())
-        where = f" at {speed_text(at.rpm)} rev/min, {number_text(at.airspeed_m_s, 4)} m/s" if len(points) > 1 else ""
-        size = f"{_LOADS[k].split(' [')[0]} of BEMT is off by {share_of}{where}"
-        return f"{who} and BEMT differ{share}: {size}, {load.times:.1f} times both bands together.{tail}"
+        return f"{who} and BEMT differ{share}: {_worst(points, off, top)}.{tail}{first_check(loads, fluid, open_)}"
     if near:
         worst = dict(sorted(near, key=lambda item: abs(item[1].difference)))  # of each load the farthest
-        of = "in" if len(every) == len(worst) else "of the largest"
-        sizes = " and ".join(f"{100.0 * load.difference / top[k]:+.0f} % {of} {_LOADS[k].split(' [')[0].lower()}"
-                             for k, load in worst.items())  # fmt: skip
-        if of == "in":
-            return f"BEMT is off by {sizes}; both bands are too wide to call that a difference.{fluid}{tail}"
-        rest = f"the others are within twice both bands, off by up to {sizes}"
-        return f"{who} and BEMT agree in {agree} of {len(every)} values; {rest}.{fluid}{tail}"
-    if lost == len(every):
+        sizes = {k: f"{100.0 * load.difference / top[k]:+.0f} %" for k, load in worst.items()}
+        if len(every) == len(worst):
+            words = " and ".join(f"{size} in {LOADS[k][0]}" for k, size in sizes.items())
+            return f"BEMT is off by {words}; both bands are too wide to call that a difference.{fluid}{tail}"
+        words = " and ".join(f"{size} of the largest {LOADS[k][0]}" for k, size in sizes.items())
+        agree = f"{who} and BEMT agree in {len(every) - len(near) - len(lost)} of {len(every)} values"
+        return f"{agree}; the others are within twice both bands, off by up to {words}.{fluid}{tail}"
+    if len(lost) == len(every):
         return f"No value of {who} and BEMT can be compared.{tail}"
+    return f"{who} and BEMT agree within both bands{_largest(every, top)}.{tail}"
+
+
+def _largest(every: Sequence[tuple[str, BothLoads]], top: Mapping[str, float]) -> str:
+    """Largest difference of loads that agree, and how wide the bands are there; "" where all are near zero."""
     far = [(k, load) for k, load in every if abs(load.cfd) > _NEAR_ZERO * top[k] and load.u_both > 0.0]
     if not far:
-        return f"{who} and BEMT agree within both bands.{tail}"
-    k, load = max(far, key=lambda x: abs(x[1].difference / x[1].cfd))
+        return ""
+    k, load = max(far, key=lambda item: abs(item[1].difference / item[1].cfd))
     wide = f"both bands together are {100.0 * load.u_both / abs(load.cfd):.0f} %"
-    return f"{who} and BEMT agree within both bands: BEMT is off by {load.percent} in " \
-           f"{_LOADS[k].split(' [')[0].lower()}, {wide}.{tail}"  # fmt: skip
+    return f": BEMT is off by {load.percent} in {LOADS[k][0]}, {wide}"
+
+
+def _worst(points: Sequence[PointOfRun], off: Sequence[tuple[str, BothLoads]], top: Mapping[str, float]) -> str:
+    """Load that is farthest off, and at which point; ``top``: largest value of each load."""
+    k, load = max(off, key=lambda item: item[1].times)
+    near_zero = abs(load.cfd) < _NEAR_ZERO * top[k]  # there the value is no measure of the difference
+    size = f"{100.0 * load.difference / top[k]:+.0f} % of the largest" if near_zero else load.percent
+    at = next(p for p in points if load in p.loads.values())
+    where = f" at {speed_text(at.rpm)} rev/min, {number_text(at.airspeed_m_s, 4)} m/s" if len(points) > 1 else ""
+    return f"{LOADS[k][0]} of BEMT is off by {size}{where}, {load.times:.1f} times both bands together"
 
 
 def _narrower(points: Sequence[PointOfRun], moved: Sequence[Moved]) -> str:
     """What most of both bands is, where they hide any difference: the unknown, or the spread of rotors as built."""
     key, load = next(iter(points[0].loads.items()))
     by, both = load.u_bemt_by, load.u_both
-    widest = max(moved, key=lambda one: float(np.nan_to_num(one.u[key][0])), default=None) if key in _KIND else None
+    widest = max(moved, key=lambda one: float(np.nan_to_num(one.u[key][0])), default=None) if key in KIND else None
     differs = any(v.verdict not in ("agrees", "within 2 u") for p in points for v in p.loads.values())
     if differs or widest is None or max(by.values(), default=0.0) < load.u_cfd:
         return ""
@@ -421,8 +312,9 @@ def _narrower(points: Sequence[PointOfRun], moved: Sequence[Moved]) -> str:
         part, what = float(widest.u[key][0]), f"{widest.unknown.key} measured and stated in the case"
     else:
         part, what = by["model"], "a clean run of this rotor on a stand, for `bemt lab calibrate-rotor`"
-    rest, unit = math.sqrt(max(both**2 - part**2, 0.0)), _LOADS[key].split("[")[1].rstrip("]")
-    return f"{what}: both bands together go from {number_text(both, 2)} to {number_text(rest, 2)} {unit} at best"
+    rest = math.sqrt(max(both**2 - part**2, 0.0))
+    sizes = f"{number_text(both, 2)} to {number_text(rest, 2)} {LOADS[key][1]}"
+    return f"{what}: both bands together go from {sizes} at best"
 
 
 def _next(
@@ -443,41 +335,54 @@ def _next(
 
 def text(found: RunComparison, details: bool = False) -> str:
     """Lay it out on one screen; with `details` all points, notes and settings."""
-    set_up = _set_up(found.conditions)
     who, bare = ("CFD", "set-up not stated") if found.kind == "cfd" else ("recorded", "a recording")
-    lines = [_filled(found.sentence), "", f"{Path(found.run).name} ({set_up or bare}) and case {found.case}"]
-    shown = found.points if details or len(found.points) <= _ROWS else found.points[: _ROWS - 1]
-    if shown is not found.points:  # and the one of the largest difference behind them, or the next
-        rest = found.points[_ROWS - 1 :]
-        shown = (*shown, max(rest, key=lambda p: max(float(np.nan_to_num(v.times)) for v in p.loads.values())))
-    rows = []
-    for p in shown:
-        head = [speed_text(p.rpm), number_text(p.airspeed_m_s, 4)]
-        for name, load in p.loads.items():
-            rows.append([
-                *head, _LOADS[name], plus_minus(load.cfd, load.u_cfd), plus_minus(load.bemt, load.u_bemt),
-                f"{number_text(load.difference, 3)} ({load.percent})", number_text(load.times, 2), load.verdict,
-            ])  # fmt: skip
-            head = ["", ""]
-    lines.append(text_table(["rev/min", "V [m/s]", "", who, "BEMT", f"BEMT - {who}", "in u", ""], rows, (2, 7), "  "))
-    if len(shown) < len(found.points):
-        lines.append(f"  ... {len(found.points) - len(shown)} more points (--details)")
+    shown = found.points if details else _shown(found.points)
     first = next(iter(found.points[0].loads.values()))
     parts = ", ".join(f"{k} {number_text(v, 2)}" for k, v in first.u_bemt_by.items())
+    header = ["rev/min", "V [m/s]", "", who, "BEMT", f"BEMT - {who}", "in u", ""]
+    lines = [
+        _filled(found.sentence), "",
+        f"{Path(found.run).name} ({_set_up(found.conditions) or bare}) and case {found.case}",
+        text_table(header, [row for p in shown for row in _rows(p)], (2, 7), "  "),
+    ]  # fmt: skip
+    if left := len(found.points) - len(shown):
+        lines.append(f"  ... {left} more points (--details)")
     lines.append(_filled(f"density {_span(p.density_kg_m3 for p in found.points)} kg/m3{_whose(found.notes)}", "  "))
     lines.append(f"  ±: one standard uncertainty; BEMT's in line 1: {parts}; in u: over both bands")
     for over in dict.fromkeys(found.averaged.values()):
         lines.append(f"  averaged: {', '.join(k for k, v in found.averaged.items() if v == over)}: {over}")
-    lines += ["", "Audit of the CFD run"] if found.audit else []
-    lines += map(_audited, found.audit if details else found.audit[:7])
+    if found.audit:
+        lines += ["", "Audit of the CFD run", *map(_audited, found.audit if details else found.audit[:7])]
     if keys := [KEYS[a.topic] for a in found.audit if a.status == "not stated" and a.topic in KEYS]:
         lines.append(_filled(f"`bemt import --setup KEY=VALUE` states: {', '.join(keys)}", "  "))
     flags = list(dict.fromkeys(f for p in found.points for f in p.flags))
     said = [f"! {n}" for n in (found.notes if details else found.notes[:4])]
     said += [f"! BEMT: {f}" for f in (flags if details else flags[:2])]
     said.append("No cause is named from one point." if len(found.points) == 1 else "No cause is named here.")
-    lines += ["", *map(_filled, [*said, f"Next: {found.next}"])]
-    return "\n".join(lines)
+    return "\n".join([*lines, "", *map(_filled, [*said, f"Next: {found.next}"])])
+
+
+def _shown(points: tuple[PointOfRun, ...]) -> tuple[PointOfRun, ...]:
+    """Points that fit on one screen: the first ones, and the one of the largest difference behind them, or the next."""
+    if len(points) <= _ROWS:
+        return points
+    rest = points[_ROWS - 1 :]
+    worst = max(rest, key=lambda p: max(float(np.nan_to_num(v.times)) for v in p.loads.values()))
+    return *points[: _ROWS - 1], worst
+
+
+def _rows(p: PointOfRun) -> list[list[str]]:
+    """One row for each load of a point; speed and airspeed in the first."""
+    head, rows = [speed_text(p.rpm), number_text(p.airspeed_m_s, 4)], []
+    for name, load in p.loads.items():
+        word, unit = LOADS[name]
+        rows.append([
+            *head, f"{word} [{unit}]" if unit else word, plus_minus(load.cfd, load.u_cfd),
+            plus_minus(load.bemt, load.u_bemt), f"{number_text(load.difference, 3)} ({load.percent})",
+            number_text(load.times, 2), load.verdict,
+        ])  # fmt: skip
+        head = ["", ""]
+    return rows
 
 
 def _span(values: Iterable[float]) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
+from bemt.judge.compare.change_document import WORD
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose.record import CHANNELS
 from bemt.judge.explanation import UNKNOWN, Explanation, Sizes
@@ -33,6 +34,26 @@ _TIE = 0.04
 _TIE_NATURAL = 0.1
 _ORDER = ("J", "M_tip", "Re", "rpm", "wall_distance_m", "tip_gap_m", "sideslip_rad", "time_s", "temperature_K",
           "density_kg_m3", "voltage_V", "current_A", "pwm_s", "run")  # fmt: skip
+CHANNEL_WORDS = {"thrust_N": "thrust", "torque_Nm": "torque", "rpm": "speed of rotation"}
+POWER = "electrical_power_W"
+# Words, unit and digits.
+_VARIABLE = {
+    "J": ("advance ratio", "", 2), "M_tip": ("tip Mach number", "", 2), "Re": ("Reynolds number", "", 0),
+    "rpm": ("speed of rotation", " rev/min", 0), "time_s": ("time", " s", 0), "temperature_K": ("temperature", " K", 1),
+    "wall_distance_m": ("wall distance", " m", 3), "tip_gap_m": ("tip gap", " m", 5), "voltage_V": ("voltage", " V", 2),
+    "current_A": ("current", " A", 1), "sideslip_rad": ("sideslip", " rad", 2),
+    "density_kg_m3": ("density", " kg/m3", 3), "pwm_s": ("pulse width", " s", 6), "run": ("run", "", 0),
+}  # fmt: skip
+_PERCENT = (0.5, 2.0)  # ratios between these are said in percent
+
+
+def share(v: float) -> str:
+    """Change of a load, less 1: in percent, as a factor where it is large.
+
+    >>> share(0.123), share(1.5), share(-0.9), share(-2.4)
+    ('+12.3 %', 'x2.5', 'x0.1', 'x-1.4')
+    """
+    return f"{v:+.1%}".replace("%", " %") if _PERCENT[0] < 1.0 + v < _PERCENT[1] else f"x{1.0 + v:.3g}"
 
 
 @dataclass(frozen=True)
@@ -61,6 +82,25 @@ class Location:
         """Plain values for JSON."""
         return {k: (list(v) if isinstance(v, tuple) else v) for k, v in vars(self).items()
                 if k not in ("mismatch", "ratio", "rpm")}  # fmt: skip
+
+    def sentence(self, words: Mapping[str, str]) -> str:
+        """Which channel is off by how much and where, with ``words`` for the channels."""
+        name, unit, digits = _VARIABLE.get(self.variable, (self.variable, "", 3))
+        wide = self.high > self.low
+        both = f"{self.low:.{digits}f} to {self.high:.{digits}f}{unit}" if wide else f"{self.low:.{digits}f}{unit}"
+        size, most = self.ratio, ""
+        if not np.isfinite(size) or size * self.size <= 0.0:  # loads near zero have no ratio
+            size, most = self.size, " of its largest value"
+            most += "" if self.variable == "rpm" and wide else " at that speed"
+        error = float(np.hypot(self.size / self.z, self.shared * (1.0 + self.size))) if self.z else float("nan")
+        error = max(abs(error * size / self.size), 1e-3) if self.size else error
+        spread = f" ± {100.0 * error:.1f}" if np.isfinite(error) else ""
+        told = f"{'high' if size > 0 else 'low'} by {100.0 * abs(size):.1f}{spread} %{most}"
+        if not most and not _PERCENT[0] < 1.0 + size < _PERCENT[1]:
+            told = f"{share(size)} of what the case gives"
+        if self.variable in ("M_tip", "Re"):
+            both += f" ({' to '.join(dict.fromkeys(f'{n:.0f}' for n in self.rpm))} rev/min)"
+        return f"{words[self.channel].capitalize()} is {told}, at {name} {both}."
 
 
 def mismatch(found: Evidence, best: Fit) -> Array:
@@ -275,6 +315,12 @@ class Diagnosis:
     def problem(self) -> Problem:
         """Readings, baseline, nuisances."""
         return self.found.problem
+
+    @property
+    def words(self) -> Mapping[str, str]:
+        """What each channel is called: electrical power where that is all that stands for a torque."""
+        electrical = any(p.record.electrical for p in self.problem.parts)
+        return {**CHANNEL_WORDS, "torque_Nm": WORD[POWER]} if electrical else CHANNEL_WORDS
 
     @property
     def in_reference(self) -> tuple[str, ...]:

@@ -174,10 +174,9 @@ def diagnosed(
     run: Mapping[str, Any],
 ) -> Answer | OnePoint:  # fmt: skip
     """Diagnose, and write what is asked; parameters as `bemt.diagnose`."""
-    only = [only] if isinstance(only, str) else list(only)
+    only, channels = ([v] if isinstance(v, str) else list(v) for v in (only, channels))
     given, files = sorted_out(several(case), several(recordings))
     known = several(reference)
-    channels = [channels] if isinstance(channels, str) else list(channels)
     _both_there(given, files, known, reference_case, repeatability_pct)
     if top_rpm is not None and not number("top_rpm", top_rpm) > 0.0:
         raise InputError(Fault("--top-rpm", "", f"{top_rpm:g}", "a speed above 0 rev/min"))
@@ -196,29 +195,28 @@ def diagnosed(
     records = [replace(r, repeatability=repeats, top_rpm=np.inf if top_rpm is None else top_rpm) for r in records]
     chosen = cases * len(stated) if len(cases) == 1 else cases
     each = cases if theirs is None else [*chosen, *[theirs] * len(known)]
-    of_case = " ".join(options_of({"case": _named(given, "CASE")}))
-    rest = options_of({
+    own, others = (tuple(map(shlex.quote, _named(*f))) for f in ((files, "RECORDING"), (known, "REFERENCE")))
+    of_case, rest = (" ".join(options_of(words)) for words in ({"case": _named(given, "CASE")}, {
         "off": off, "only": only, "channels": channels,
         "reference-case": _named(several(reference_case), "CASE"), "rpm": speeds, "airspeed-m-s": winds,
         "density-kg-m3": air, "repeatability-pct": several(repeatability_pct),
         "zones": run["zones"], "top-rpm": several(top_rpm),
         "baseline": [baseline] * (baseline != "bemt"),
-    })  # fmt: skip
-    stated_of = stated_options(run)
-    own, others = (tuple(map(shlex.quote, _named(*f))) for f in ((files, "RECORDING"), (known, "REFERENCE")))
-    asked = Given(own, others, of_case, " ".join(rest), tuple(ruled_out), tuple(changed), stated_of)
+    }))  # fmt: skip
+    asked = Given(own, others, of_case, rest, tuple(ruled_out), tuple(changed), stated_options(run))
     heard = [CHANNELS[c] for c in channels] or None
     one = [v[0] if len(v) == 1 else None for v in (speeds, winds)]
     blade = {} if along is None else along_blade(cases[0], Path(path_text("along", along)), records, *one)
-    beside = {"along_blade": {run: c.document() for run, c in blade.items()}} if blade else {}
+    beside = {"along_blade": {name: c.document() for name, c in blade.items()}} if blade else {}
     try:
         answer = diagnose(records, each, only or None, progress, baseline=baseline, given=asked, channels=heard)
     except InputError as error:
         if len(records) > 1 or any(f.where != "readings" for f in error.faults) or not isinstance(files[0], str):
             raise
-        called = given[0] if isinstance(given[0], str) else ""
-        found = _one_point(stated, cases[0], called, error.faults[0].got, progress)
-        return OnePoint({**found.document, **beside}, "\n\n".join([found.text, *(c.text() for c in blade.values())]))
+        found = _one_point(stated, cases[0], given[0] if isinstance(given[0], str) else "", progress)
+        lead = f"Too few readings for a diagnosis ({error.faults[0].got}).\n{one_run.text(found)}"
+        told = {**found.document(), "verdict": "insufficient", "effects": [], **beside}
+        return OnePoint(told, "\n\n".join([lead, *(c.text() for c in blade.values())]))
     names = [one if isinstance(one, str) else "recording" for one in files]
     told = document(answer) | {"recordings": names, "cases": [c.name for c in cases]} | beside
     if target is not None:
@@ -229,13 +227,11 @@ def diagnosed(
 
 
 def _one_point(
-    stated: Sequence[Any], case: Case, called: str, got: str, progress: Callable[[str], None] | None
-) -> OnePoint:  # fmt: skip
+    stated: Sequence[Any], case: Case, called: str, progress: Callable[[str], None] | None
+) -> one_run.RunComparison:
     """One point, or grids of one condition, cannot be diagnosed: it is shown beside the model."""
     seen = stated[0] if len(stated) == 1 else together([import_file(f) if isinstance(f, str) else f for f in stated])
-    found = one_run.compare_run(seen, case, progress, called)
-    words = f"Too few readings for a diagnosis ({got}).\n{one_run.text(found)}"
-    return OnePoint({**found.document(), "verdict": "insufficient", "effects": []}, words)
+    return one_run.compare_run(seen, case, progress, called)
 
 
 def _inside(records: Sequence[Record], cases: Sequence[Case]) -> str:

@@ -13,15 +13,7 @@ from bemt.base.arrays import Array
 from bemt.judge import loss
 from bemt.judge.compare import recordings
 from bemt.judge.compare.drive_laws import Judgement
-from bemt.judge.compare.matched import (
-    LOADS,
-    MARGIN,
-    SESSION,
-    density_change,
-    like_voltage,
-    log_range,
-    losses_differ,
-)
+from bemt.judge.compare.matched import LOADS, MARGIN, SESSION, density_change, like_voltage, losses_differ
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import knowledge, posterior, signatures
 from bemt.judge.diagnose.assemble import assemble
@@ -187,8 +179,8 @@ def _in_reach(test: Record, known: Record) -> Record:
     """Points of the test where the reference was, with a margin; all where they share no range."""
     keep = np.ones(len(test), dtype=bool)
     for x, seen in ((np.log(test.rpm), np.log(known.rpm)), (test.V / test.rpm, known.V / known.rpm)):
-        low, high = log_range(seen, MARGIN)
-        inside = (x >= low) & (x <= high)
+        wider = MARGIN * max(float(np.ptp(seen)), 1e-12)
+        inside = (x >= seen.min() - wider) & (x <= seen.max() + wider)
         if (keep & inside).sum() >= _FEWEST:
             keep &= inside
     return test.take(np.flatnonzero(keep))

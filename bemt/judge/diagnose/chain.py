@@ -225,8 +225,6 @@ def _commands(chosen: suggestion.Suggestion, given: suggestion.Given) -> tuple[s
         return (given.command(ruled_out=chosen.checks),)
     if chosen.kind == "air":
         return given.of_days()
-    if chosen.kind == "rotor":
-        return f"bemt lab calibrate-rotor REFERENCE {given.case}", given.command(reference="REFERENCE")
     if chosen.kind == "case":
         return (replace(given, case="--case LABEL").command(),)
     if chosen.kind == "mend":
@@ -248,7 +246,7 @@ def _settling(found: posterior.Evidence, decision: loss.Decision, best: fitting.
         faint = rivals_of(["", *singles][:_MOST_RIVALS])
         return suggestion.nothing_called_for(found, faint, found.probability[UNKNOWN])
     if decision.by == "files" and found.problem.other_setup:
-        return suggestion.Suggestion(ONE_SETUP, (), (), 0.0, 0.0, "cfd")
+        return suggestion.Suggestion(ONE_SETUP, "cfd")
     if decision.verdict == "insufficient" and (mend := other_rotor.to_mend(found.problem)):
         return suggestion.mended(found, mend)
     if other_rotor.doubted(found.problem, decision):
@@ -258,7 +256,7 @@ def _settling(found: posterior.Evidence, decision: loss.Decision, best: fitting.
     if by_law and (looked := suggestion.look(by_law[:1], found.problem.parts[0].record)):
         return looked
     if not singles:
-        return suggestion.Suggestion(suggestion.REFERENCE, (), (), 0.0, 0.0, "reference")
+        return suggestion.Suggestion(suggestion.REFERENCE, "reference")
     if decision.verdict == "insufficient" and (note := suggestion.weather(found)):
         return note
     sure = decision.effects[:1] if decision.beside else decision.effects
@@ -337,12 +335,10 @@ def partitions(problem: Problem, most: int = 6) -> list[tuple[str, NDArray[np.in
     return [(f"intervals of {name}", whole(rank * min(4, count) // count))]
 
 
-def held_out(
-    found: Evidence, what: Explanation, split: tuple[str, NDArray[np.intp]] | None = None
-) -> tuple[str, Array, Array]:
+def held_out(found: Evidence, what: Explanation) -> tuple[str, Array, Array]:
     """Predict every block from the others, with and without an explanation."""
     problem = found.problem
-    words, block = split or partitions(problem)[0]
+    words, block = partitions(problem)[0]
     member = block[problem.point]
     hyper = found.states[0].hyper
     C = noise.covariance(problem, hyper)

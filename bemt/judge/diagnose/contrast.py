@@ -15,14 +15,7 @@ from typing import TYPE_CHECKING, Any
 from bemt.base.action import Answered, Told
 from bemt.base.document import rows_of
 from bemt.base.errors import Fault, InputError, gathered, refuse
-from bemt.judge.compare.change_document import (
-    DIAGNOSED,
-    ComparedRuns,
-    RankedCause,
-    document,
-    next_step,
-    text,
-)
+from bemt.judge.compare.change_document import DIAGNOSED, ComparedRuns, RankedCause, document, next_step, text
 from bemt.judge.compare.matched import stand_run
 from bemt.judge.compare.recordings import RunChange
 from bemt.judge.compare.selection import Invocation, conditions_of, selected, with_air
@@ -115,19 +108,10 @@ class Contrast(Answered):
 
 
 def compare(
-    a: Any,
-    b: Any,
-    case: Propeller | Case | str | os.PathLike[str] | None = None,
-    *,
-    diameter_m: float | None = None,
-    label: str | None = None,
-    rows_a: Sequence[str] = (),
-    rows_b: Sequence[str] = (),
-    air_a: str | None = None,
-    air_b: str | None = None,
-    progress: Callable[[str], None] | None = None,
-    run: Mapping[str, Any] | None = None,
-) -> Contrast:
+    a: Any, b: Any, case: Propeller | Case | str | os.PathLike[str] | None = None, *, diameter_m: float | None = None,
+    label: str | None = None, rows_a: Sequence[str] = (), rows_b: Sequence[str] = (), air_a: str | None = None,
+    air_b: str | None = None, progress: Callable[[str], None] | None = None, run: Mapping[str, Any] | None = None,
+) -> Contrast:  # fmt: skip
     """Say what changed between two recordings of one stand: paths, Datasets or DataFrames.
 
     ``label``, such as ``"10x5"``, gives the diameter. ``air_a`` and ``air_b`` say what the files do not:
@@ -138,62 +122,59 @@ def compare(
     Loads are compared as load / (rho n^2) on a smooth curve over ln n and V/(n D), by Gaussian processes (Rasmussen and
     Williams 2006, eq. 2.23 to 2.24 and 2.37 to 2.42). Density counts where both recordings tell it.
     """
-    from bemt.data.recordings.load import as_stated, import_file, stated_options
+    from bemt.data.recordings.load import stated_options
     from bemt.judge.diagnose.load import is_table
-    from bemt.physics.dataset import Dataset, from_pandas
 
     names = ["A" if is_table(a) else os.fspath(a), "B" if is_table(b) else os.fspath(b)]
-    asked = Invocation(
-        names[0], names[1], tuple(rows_a), tuple(rows_b), air_a, air_b, label,
-        None if case is None else os.fspath(case) if isinstance(case, str | os.PathLike)
-        else rotor_of(case).case.path.as_posix(), diameter_m,
-        stated_options(run or {}),
-    )  # fmt: skip
-    diameter_m = label_diameter(label) if diameter_m is None else diameter_m
-    case = None if case is None else rotor_of(case).case
-    conditions = [list(rows_a), list(rows_b)]
+    D = label_diameter(label) if diameter_m is None else diameter_m
+    rotor = None if case is None else rotor_of(case).case
+    named = None if rotor is None else os.fspath(case) if isinstance(case, str | os.PathLike) else rotor.path.as_posix()
+    asked = Invocation(names[0], names[1], tuple(rows_a), tuple(rows_b), air_a, air_b, label, named, diameter_m,
+                       stated_options(run or {}))  # fmt: skip
     if (a is b or Path(names[0]).resolve() == Path(names[1]).resolve()) and sorted(rows_a) == sorted(rows_b):
-        raise InputError(
-            Fault(
-                names[0], "", "the same recording twice", "two recordings, or two choices of rows",
-                _two_choices(names[0]),
-            )
-        )  # fmt: skip
+        expected = "two recordings, or two choices of rows"
+        raise InputError(Fault(names[0], "", "the same recording twice", expected, _two_choices(names[0])))
     read: list[Dataset] = []
     faults: list[Fault] = []
-    for given, name, rows, air, option in zip(
-        (a, b), names, conditions, (air_a, air_b), ("--air-a", "--air-b"), strict=True
-    ):
+    for given, name, rows, air, letter in ((a, names[0], rows_a, air_a, "a"), (b, names[1], rows_b, air_b, "b")):
         with gathered(faults):
-            told = name if not is_table(given) else given
-            told = as_stated([told], {k: v for k, v in (run or {}).items() if k != "rpm"})[0]
-            made = from_pandas(told, name=name) if hasattr(told, "columns") else told
-            whole = made if isinstance(made, Dataset) else import_file(name)
-            read.append(with_air(selected(whole, rows, name), air, option))
+            read.append(with_air(selected(_read(given, name, run or {}), list(rows), name), air, f"--air-{letter}"))
     refuse(faults)
-    D = case.diameter_m if case is not None and diameter_m is None else diameter_m
-    rho = None if case is None else float(case.air().rho)
-    findings = [_findings(imported, D, case is not None and case.ducted, rho) for imported in read]
+    D = rotor.diameter_m if rotor is not None and D is None else D
+    rho = None if rotor is None else float(rotor.air().rho)
+    findings = [_findings(imported, D, rotor is not None and rotor.ducted, rho) for imported in read]
     read = [_sound(imported, found) for imported, found in zip(read, findings, strict=True)]
     runs = []
-    for name, rows, imported in zip(names, conditions, read, strict=True):
+    for name, rows, imported in zip(names, (rows_a, rows_b), read, strict=True):
         with gathered(faults):
             runs.append(stand_run(imported, f"{name} ({', '.join(rows)})" if rows else name, D))
     refuse(faults)
     found = changed(runs[0], runs[1], math.nan if D is None else D)
     said = document(found)
-    if case is not None and not (found.wind or found.without_speed):
-        said = _diagnosed(said, asked, read, case, found, progress)
-    if said.diagnosis is None:
-        step: Mapping[str, Any] = next_step(found, asked)
-    else:
-        step = said.diagnosis["next_measurement"]
-        step = {**step, "command": [*step["commands"], ""][0]}
-    step = {**step, "command": ""} if step["command"] == asked.command() else step
+    if rotor is not None and not (found.wind or found.without_speed):
+        said = _diagnosed(said, asked, read, rotor, found, progress)
     return Contrast(found, replace(
         said, recordings=tuple(names), rows={"A": tuple(rows_a), "B": tuple(rows_b)},
-        notes=(*_errors(findings), *said.notes), next_measurement=step,
+        notes=(*_errors(findings), *said.notes), next_measurement=_next(said, found, asked),
     ))  # fmt: skip
+
+
+def _read(given: Any, name: str, run: Mapping[str, Any]) -> Dataset:
+    """A recording as the user states it."""
+    from bemt.data.recordings.load import as_stated, import_file
+    from bemt.judge.diagnose.load import is_table
+    from bemt.physics.dataset import Dataset, from_pandas
+
+    told = as_stated([given if is_table(given) else name], {k: v for k, v in run.items() if k != "rpm"})[0]
+    made = from_pandas(told, name=name) if hasattr(told, "columns") else told
+    return made if isinstance(made, Dataset) else import_file(name)
+
+
+def _next(said: ComparedRuns, change: RunChange, asked: Invocation) -> Mapping[str, Any]:
+    """Next step, with a command unless it would ask the same again."""
+    step: Mapping[str, Any] = said.diagnosis["next_measurement"] if said.diagnosis else next_step(change, asked)
+    command = [*step["commands"], ""][0] if said.diagnosis else step["command"]
+    return {**step, "command": "" if command == asked.command() else command}
 
 
 def compared(

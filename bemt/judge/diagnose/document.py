@@ -3,64 +3,46 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from bemt import __version__
 from bemt.base.tables import or_null, text_table
 from bemt.data.recordings.channels import AS_ELECTRICAL, AS_SHAFT
-from bemt.judge.compare.change_document import WORD, families, title_of
+from bemt.judge.compare.change_document import WORD, families
+from bemt.judge.compare.drive_laws import title_of
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import other_rotor
-from bemt.judge.diagnose.answer import bare
+from bemt.judge.diagnose.answer import POWER, bare, share
 from bemt.judge.diagnose.form import nearest
 from bemt.judge.diagnose.posterior import LEAST
 from bemt.judge.diagnose.record import DROPPED, NO_SPEED, POWER_OPEN
 from bemt.judge.diagnose.suggest import LEVEL
 from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation, Size
+from bemt.judge.loss import CLAIMS
 from bemt.physics import effects
 from bemt.physics.effects.propeller import AnotherPropeller
 from bemt.rotors.case.fresh import OPEN_ENDINGS
 
 if TYPE_CHECKING:
-    from bemt.judge.diagnose.answer import Diagnosis, Location
+    from bemt.judge.diagnose.answer import Diagnosis
     from bemt.physics.effects import Parameter
 
 SCHEMA = "bemt.diagnosis/1"
-
-_CHANNEL = {"thrust_N": "Thrust", "torque_Nm": "Torque", "rpm": "Speed of rotation"}
-_POWER = "electrical_power_W"
-_BY_POWER = {**_CHANNEL, "torque_Nm": WORD[_POWER].capitalize()}
-# Share of a parameter's range that its interval may take before nothing is said of it [1].
-_OPEN = 0.95
-_VARIABLE = {
-    "J": ("advance ratio", "", 2), "M_tip": ("tip Mach number", "", 2), "Re": ("Reynolds number", "", 0),
-    "rpm": ("speed of rotation", " rev/min", 0), "time_s": ("time", " s", 0), "temperature_K": ("temperature", " K", 1),
-    "wall_distance_m": ("wall distance", " m", 3), "tip_gap_m": ("tip gap", " m", 5), "voltage_V": ("voltage", " V", 2),
-    "current_A": ("current", " A", 1), "sideslip_rad": ("sideslip", " rad", 2),
-    "density_kg_m3": ("density", " kg/m3", 3),    "pwm_s": ("pulse width", " s", 6), "run": ("run", "", 0),
-}  # fmt: skip
+_OPEN = 0.95  # share of a parameter's range that its interval may take before nothing is said of it [1]
 _SHOWN = 8
 _FINDINGS = 3
-# Members from which on a class is said as a group.
-_A_GROUP = 5
-# Least probability of a guess.
-_GUESS = 0.3
-# Level that is said even where no cause shows.
-_WORTH_SAYING = 0.05
-# Level from which on it is asked whether the rotor is that of the case.
-_WORTH_ASKING = 0.15
+_A_GROUP = 5  # members from which on a class is said as a group
+_GUESS = 0.3  # least probability of a guess
+# Level that is said even where no cause shows, and from which on it is asked whether the rotor is that of the case.
+_WORTH_SAYING, _WORTH_ASKING = 0.05, 0.15
 # Lines of an answer, and sentences that are only in its details.
 _LINES, _DETAILS = 12, ("Model: ", "Signature: ", "Predicting ")
-# Ratios between these are said in percent.
-_PERCENT = (0.5, 2.0)
 
 
 def document(d: Diagnosis) -> dict[str, Any]:
     """Give the document."""
-    found = d.found
+    found, said, hyper = d.found, d.said, d.found.states[0].hyper
     ranking = []
     for name, p in sorted(found.probability.items(), key=lambda kv: -kv[1])[:12]:
         solved = name.ids and all(i in found.spans for i in name)
@@ -68,8 +50,6 @@ def document(d: Diagnosis) -> dict[str, Any]:
         sizes = d.parameters if name == d.decision.leading else own
         flat = {(f"{i}.{k}" if name.pair else k): v.document() for i, q in sizes.items() for k, v in q.items()}
         ranking.append({"effect": str(name), "probability": p, "parameters": flat})
-    state = found.states[0]
-    said = d.said
     return {
         "schema": SCHEMA,
         "version": __version__,
@@ -91,8 +71,7 @@ def document(d: Diagnosis) -> dict[str, Any]:
         "log_bayes": {str(e): found.log_bayes(e) for e in (*map(Explanation.of, found.spans), UNKNOWN)},
         "nearest_signature": nearest(found),
         "visibility": {i: float(s) for i, s in zip(d.alike.ids, d.alike.size, strict=True)},
-        "covariance": {"noise_scale": state.hyper.scale, "correlation": state.hyper.ar,
-                       "solver_error": state.hyper.model},
+        "covariance": {"noise_scale": hyper.scale, "correlation": hyper.ar, "solver_error": hyper.model},
         "baseline": [effects.to_text(e) for e in d.problem.baseline],
         "not_tried": dict(d.absent),
         "rule": said.why,
@@ -105,30 +84,6 @@ def document(d: Diagnosis) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _words(d: Diagnosis) -> Mapping[str, str]:
-    """What each channel is called: electrical power where that is all that stands for a torque."""
-    return _BY_POWER if any(p.record.electrical for p in d.problem.parts) else _CHANNEL
-
-
-def _where(w: Location, words: Mapping[str, str]) -> str:
-    name, unit, digits = _VARIABLE.get(w.variable, (w.variable, "", 3))
-    both = f"{w.low:.{digits}f} to {w.high:.{digits}f}{unit}" if w.high > w.low else f"{w.low:.{digits}f}{unit}"
-    error = float(np.hypot(w.size / w.z, w.shared * (1.0 + w.size))) if w.z else float("nan")
-    size, most = w.ratio, ""
-    if not np.isfinite(size) or size * w.size <= 0.0:  # loads near zero have no ratio
-        size, most = w.size, " of its largest value"
-        most += "" if w.variable == "rpm" and w.high > w.low else " at that speed"
-    error = max(abs(error * size / w.size), 1e-3) if w.size else error
-    spread = f" ± {100.0 * error:.1f}" if np.isfinite(error) else ""
-    way = "high" if size > 0 else "low"
-    told = f"{way} by {100.0 * abs(size):.1f}{spread} %{most}"
-    if not most and not _PERCENT[0] < 1.0 + size < _PERCENT[1]:
-        told = f"{_share(size)} of what the case gives"
-    if w.variable in ("M_tip", "Re"):
-        both += f" ({' to '.join(dict.fromkeys(f'{n:.0f}' for n in w.rpm))} rev/min)"
-    return f"{words[w.channel]} is {told}, at {name} {both}."
-
-
 def _unexplained(d: Diagnosis) -> list[str]:
     """What the recording shows, and, where it is another thing, what calibration would leave of it.
 
@@ -136,9 +91,9 @@ def _unexplained(d: Diagnosis) -> list[str]:
     sign and even its channel may be those of something that the recording does not show.
     """
     seen, rest = bare(d.found), d.where
-    lines = [_where(seen, _words(d))]
+    lines = [seen.sentence(d.words)]
     if (seen.channel, seen.size > 0) != (rest.channel, rest.size > 0):
-        words = _where(rest, _words(d))
+        words = rest.sentence(d.words)
         lines.append(f"Beyond the uncertainty of gains, blade angle and solver: {words[0].lower()}{words[1:]}")
     return lines
 
@@ -148,7 +103,7 @@ def _gain(d: Diagnosis) -> str:
     for channel, s in d.scores.items():
         most = s["largest"] or 1.0
         words.append(
-            f"{_words(d)[channel].lower()} {s['holdout_before'] / most:.1%} before, {s['holdout_after'] / most:.1%} "
+            f"{d.words[channel]} {s['holdout_before'] / most:.1%} before, {s['holdout_after'] / most:.1%} "
             f"after (noise {s['noise'] / most:.1%}, smooth fit without physics {s['gp_only'] / most:.1%})"
         )
     head = f"Predicting {d.blocks} it was not fitted to, the error in % of the largest value is: "
@@ -231,66 +186,95 @@ def _odds(told: Size) -> str:
 
 def explanation(d: Diagnosis) -> list[str]:
     """Say the answer in a few sentences."""
-    decision, catalogue = d.said, effects.catalogue()
-    lines = [headline(d), *(f"{words[:1].upper()}{words[1:]}." for words in d.problem.no_check)]
-    off_torque = decision.verdict != "none" and abs(d.problem.level.get("torque_Nm", 0.0)) > LEVEL
-    marks = (NO_SPEED, AS_ELECTRICAL, POWER_OPEN, *([AS_SHAFT] if off_torque else []))
-    lines += [f"Before any physics: {note}." for note in d.problem.notes if any(mark in note for mark in marks)]
-    lines += [f"Before any physics: {f}" for f in d.problem.findings[:_FINDINGS]]
-    if len(d.problem.findings) > _FINDINGS:
-        lines[-1] += f" And {len(d.problem.findings) - _FINDINGS} more; `import` shows all."
-    lines += [f"Before any physics: {note}." for note in d.problem.notes if DROPPED in note]
-    lines += [f"Model: {words}." for words in d.problem.validity]
+    return [
+        headline(d), *(f"{words[:1].upper()}{words[1:]}." for words in d.problem.no_check), *_before_physics(d),
+        *(f"Model: {words}." for words in d.problem.validity), *_reference_off(d), *_of_another_rotor(d),
+        *(_without_cause(d) if d.said.verdict == "none" else _with_cause(d)), _gain(d), *_of_loads(d), *_next(d),
+        *_not_tried(d),
+    ]  # fmt: skip
+
+
+def _before_physics(d: Diagnosis) -> list[str]:
+    """What the files leave open, contradict or lose."""
+    problem, notes = d.problem, d.problem.notes
+    marks = [NO_SPEED, AS_ELECTRICAL, POWER_OPEN]
+    if d.said.verdict != "none" and abs(problem.level.get("torque_Nm", 0.0)) > LEVEL:
+        marks.append(AS_SHAFT)
+    findings = list(problem.findings[:_FINDINGS])
+    if left := problem.findings[_FINDINGS:]:
+        findings[-1] += f" And {len(left)} more; `import` shows all."
+    open_ = (f"{note}." for note in notes if any(mark in note for mark in marks))
+    dropped = (f"{note}." for note in notes if DROPPED in note)
+    return [f"Before any physics: {words}" for words in (*open_, *findings, *dropped)]
+
+
+def _reference_off(d: Diagnosis) -> list[str]:
+    """How far the reference is from the case as stated, before the blade was fitted to it."""
     stated = d.problem.blade.moved
-    if any(abs(v) > LEVEL for v in stated.values()):
-        off = " and ".join(f"{_words(d)[c].lower()} {_share(v)}" for c, v in stated.items())
-        lines.append(f"The reference is off the case as stated by {off}; the blade was fitted to it. Are diameter, "
-                     "pitch and blades of the case right?")  # fmt: skip
-    level = d.problem.level
-    off = " and ".join(
-        f"{_words(d)[c].lower()} by {_share(v) if abs(v) > 1.0 else f'{v:+.0%}'}" for c, v in level.items()
-    )
-    alone, doubted = d.problem.free.all(), other_rotor.doubted(d.problem, decision)
-    open_ = alone and decision.verdict in ("insufficient", "unknown") and not d.problem.findings
-    # the readings speak for another rotor than the case's
-    speaks = d.found.probability.get(DOUBT, 0.0) > d.found.prior.get(DOUBT, 1.0)
-    likelier = open_ and level and speaks and not doubted
-    if likelier or doubted or decision.effects[:1] == (AnotherPropeller.id,):
-        lead = f"The loads are off the middle of the band ({off}): are {_stated(d)} its own?" if likelier else ""
-        near = other_rotor.nearest_rotors(d.problem)
-        lines += [told] if (told := " ".join(filter(None, (lead, near and f"Nearest rotors: {near}.")))) else []
-    if decision.verdict == "none":
-        lines.append(f"Why: {decision.why}.")
-        if max((abs(v) for v in level.values()), default=0.0) > _WORTH_SAYING:
-            lines.append(f"The level is off ({off}), within what gain, blade angle and solver allow; no cause shows.")
-            if alone and max(map(abs, level.values())) > _WORTH_ASKING:
-                lines[-1] += f" Are {_stated(d)} right?"
-        return [*lines, _gain(d), *_next(d), *_not_tried(d)]
-    known = decision.verdict not in ("unknown", "insufficient") or doubted
-    lines += [_where(d.where, _words(d))] if known else _unexplained(d)
-    if decision.verdict in ("named", "sensor"):
-        told = _parameters(d)
+    if all(abs(v) <= LEVEL for v in stated.values()):
+        return []
+    off = " and ".join(f"{d.words[c]} {share(v)}" for c, v in stated.items())
+    return [f"The reference is off the case as stated by {off}; the blade was fitted to it. Are diameter, "
+            "pitch and blades of the case right?"]  # fmt: skip
+
+
+def _level(d: Diagnosis) -> str:
+    """How far the loads are from those of the case."""
+    sizes = {c: share(v) if abs(v) > 1.0 else f"{v:+.0%}" for c, v in d.problem.level.items()}
+    return " and ".join(f"{d.words[c]} by {size}" for c, size in sizes.items())
+
+
+def _of_another_rotor(d: Diagnosis) -> list[str]:
+    """Question whether the case is that of the rotor, and rotors that are nearer, where the loads speak for others."""
+    said, problem, P = d.said, d.problem, d.found.probability
+    doubted, lead = other_rotor.doubted(problem, said), ""
+    open_ = problem.free.all() and said.verdict in ("insufficient", "unknown") and not problem.findings
+    if open_ and problem.level and not doubted and P.get(DOUBT, 0.0) > d.found.prior.get(DOUBT, 1.0):
+        lead = f"The loads are off the middle of the band ({_level(d)}): are {_stated(d)} its own?"
+    if not (lead or doubted or said.effects[:1] == (AnotherPropeller.id,)):
+        return []
+    near = other_rotor.nearest_rotors(problem)
+    words = [*filter(None, [lead, near and f"Nearest rotors: {near}."])]
+    return [" ".join(words)] if words else []
+
+
+def _without_cause(d: Diagnosis) -> list[str]:
+    """Why there is no cause, and that the level is off all the same."""
+    level = max(map(abs, d.problem.level.values()), default=0.0)
+    lines = [f"Why: {d.said.why}."]
+    if level > _WORTH_SAYING:
+        ask = d.problem.free.all() and level > _WORTH_ASKING
         lines.append(
-            f"Named: {', '.join(map(title_of, decision.effects))} (probability {decision.probability:.2f})"
-            + (f": {told}." if told else ".")
+            f"The level is off ({_level(d)}), within what gain, blade angle and solver allow; no cause shows."
+            + (f" Are {_stated(d)} right?" if ask else "")
         )
-        signs = [catalogue[i].sign for i in decision.effects if i in catalogue and catalogue[i].sign]
-        if signs:
-            lines.append("Signature: " + "; ".join(signs) + ".")
-    elif decision.verdict == "class":
-        lead = "One of these" if len(decision.sets) < 2 else f"{decision.why[0].upper()}{decision.why[1:]}"
-        members = ", ".join(_title(d, i) for i in decision.effects)
-        lines.append(f"{lead} ({decision.probability:.2f}): {members}.")
-    elif decision.verdict == "unknown":
-        kernel = d.found.states[0].best_rival
-        lines.append(f"The cause is not in the library: {decision.why}. It shows in {kernel}.")
+    return lines
+
+
+def _with_cause(d: Diagnosis) -> list[str]:
+    """Where the recording differs from the case, and what is said of the cause."""
+    said = d.said
+    if said.verdict in ("named", "sensor"):
+        told, known = _parameters(d), effects.catalogue()
+        named = f"Named: {', '.join(map(title_of, said.effects))} (probability {said.probability:.2f})"
+        signs = "; ".join(known[i].sign for i in said.effects if i in known and known[i].sign)
+        words = [f"{named}: {told}." if told else f"{named}.", *([f"Signature: {signs}."] if signs else [])]
+    elif said.verdict == "class":
+        lead = "One of these" if len(said.sets) < 2 else f"{said.why[0].upper()}{said.why[1:]}"
+        words = [f"{lead} ({said.probability:.2f}): {', '.join(_title(d, i) for i in said.effects)}."]
+    elif said.verdict == "unknown":
+        words = [f"The cause is not in the library: {said.why}. It shows in {d.found.states[0].best_rival}."]
     else:
-        lines.append(f"No name is given: {decision.why}.")
-    lines.append(_gain(d))
-    if d.loads is not None and d.loads.decision.verdict != "none":
-        lines.append(f"Thrust and torque at the measured speed, judged separately: {headline(d.loads)}")
-    lines += [*_next(d), *_not_tried(d)]
-    return [line for line in lines if line]
+        words = [f"No name is given: {said.why}."]
+    claimed = said.verdict not in ("unknown", "insufficient") or other_rotor.doubted(d.problem, said)
+    return [*([d.where.sentence(d.words)] if claimed else _unexplained(d)), *words]
+
+
+def _of_loads(d: Diagnosis) -> list[str]:
+    """What thrust and torque say for themselves, where the answer is that of the drive."""
+    if d.loads is None or d.loads.decision.verdict == "none":
+        return []
+    return [f"Thrust and torque at the measured speed, judged separately: {headline(d.loads)}"]
 
 
 def _stated(d: Diagnosis) -> str:
@@ -326,35 +310,42 @@ def _not_tried(d: Diagnosis) -> list[str]:
 
 def headline(d: Diagnosis) -> str:
     """What an engineer would say first."""
-    said, off, doubted = d.said, _off(d), other_rotor.doubted(d.problem, d.said)
-    if said.verdict == "insufficient" and (other_rotor.foreign(d.problem) or doubted):
-        return f"These are not the loads of this case ({off}): check diameter, blades, units and speed first."
+    said = d.said
+    if said.verdict == "none":
+        return _agreement(d)
+    if said.verdict in CLAIMS:
+        moved = ", ".join(f"{name} {share(v)}" for name, v in _ratios(d))
+        against = f" ({moved} against the reference)" if moved else ""
+        return f"{_of_class(d) if said.verdict == 'class' else _of_name(d)}{against}{_in_both(d)}."
+    if said.verdict == "insufficient" and (other_rotor.foreign(d.problem) or other_rotor.doubted(d.problem, said)):
+        return f"These are not the loads of this case ({_off(d)}): check diameter, blades, units and speed first."
     file, wrong, _ = other_rotor.contradiction(d.problem)
     if file and said.verdict == "insufficient" and not _guess(d):  # a duct or a wall may be why it looks impossible
         return f"{file} cannot be right: {wrong}. Mend that before any cause is looked for."
-    if said.verdict == "none" and not d.problem.free.all():
-        apart = _from_reference(d) or "the recording differs from the reference"
-        return f"No cause above {100.0 * LEAST:g} %: {apart}, no more than runs do; from the model fitted to the " \
-               f"reference, {off}."  # fmt: skip
-    if said.verdict == "none" and max((abs(v) for v in d.problem.level.values()), default=0.0) > LEVEL:
-        return f"Recording and model differ ({off}), within the uncertainty of calibration, blade and solver; no cause."
-    if said.verdict == "none":
-        return "Recording and model agree within noise, calibration and the uncertainty of the model."
-    moved = ", ".join(f"{name} {_share(v)}" for name, v in _ratios(d))
-    end = f"{f' ({moved} against the reference)' if moved else ''}{_in_both(d)}."
-    if said.verdict in ("named", "sensor"):
-        where = "" if said.verdict == "named" else " in the stand, not the air"
-        return f"Cause found{where}: {' and '.join(_with_size(d, i) for i in said.effects)}{end}"
-    if said.verdict == "class":
-        return f"{_of_class(d)}{end}"
-    what = _from_reference(d) or f"Recording and model differ ({off})"
-    why = "and no effect in the library explains it"
-    why = why if said.verdict == "unknown" else f"but these readings do not show why{_guess(d)}"
+    what = _from_reference(d) or f"Recording and model differ ({_off(d)})"
+    shown = f"but these readings do not show why{_guess(d)}"
+    why = "and no effect in the library explains it" if said.verdict == "unknown" else shown
     return f"{what[0].upper()}{what[1:]}, {why}."
 
 
+def _agreement(d: Diagnosis) -> str:
+    """How far recording and model, or reference, agree where there is no cause."""
+    if not d.problem.free.all():
+        apart = _from_reference(d) or "the recording differs from the reference"
+        return f"No cause above {100.0 * LEAST:g} %: {apart}, no more than runs do; from the model fitted to the " \
+               f"reference, {_off(d)}."  # fmt: skip
+    if max(map(abs, d.problem.level.values()), default=0.0) > LEVEL:
+        allowed = "within the uncertainty of calibration, blade and solver; no cause"
+        return f"Recording and model differ ({_off(d)}), {allowed}."
+    return "Recording and model agree within noise, calibration and the uncertainty of the model."
+
+
+def _of_name(d: Diagnosis) -> str:
+    where = " in the stand, not the air" if d.said.verdict == "sensor" else ""
+    return f"Cause found{where}: {' and '.join(_with_size(d, i) for i in d.said.effects)}"
+
+
 def _of_class(d: Diagnosis) -> str:
-    """What is said of a class."""
     said = d.said
     titles = [_title(d, i) for i in said.effects]
     if said.beside:
@@ -373,7 +364,7 @@ def _of_class(d: Diagnosis) -> str:
 
 def _off(d: Diagnosis) -> str:
     """By how much each channel differs from the case."""
-    words = (f"{_words(d)[c].lower()} {'up to ' if wide else ''}{_share(v)}" for c, (v, wide) in d.off.items())
+    words = (f"{d.words[c]} {'up to ' if wide else ''}{share(v)}" for c, (v, wide) in d.off.items())
     return " and ".join(words)
 
 
@@ -398,74 +389,63 @@ def _ratios(d: Diagnosis) -> list[tuple[str, float]]:
     if d.change is None:
         return []
     of = d.change.loads_by_name.values()
-    return [(WORD[_POWER] if c.channel == _POWER else c.name, d.change.ratios[c.channel].ratio - 1.0) for c in of]
+    return [(WORD[c.channel] if c.channel == POWER else c.name, d.change.ratios[c.channel].ratio - 1.0) for c in of]
 
 
 def _from_reference(d: Diagnosis) -> str:
     """What the recording differs from the reference by, in words."""
-    words = " and ".join(f"{name} by {_share(v)}" for name, v in _ratios(d))
+    words = " and ".join(f"{name} by {share(v)}" for name, v in _ratios(d))
     return f"the recording differs from the reference ({words} at equal speed)" if words else ""
-
-
-def _share(v: float) -> str:
-    """Change of a load, less 1: in percent, as a factor where it is large.
-
-    >>> _share(0.123), _share(1.5), _share(-0.9), _share(-2.4)
-    ('+12.3 %', 'x2.5', 'x0.1', 'x-1.4')
-    """
-    return f"{v:+.1%}".replace("%", " %") if _PERCENT[0] < 1.0 + v < _PERCENT[1] else f"x{1.0 + v:.3g}"
 
 
 def text(d: Diagnosis, details: bool = False, lead: str = "") -> str:
     """The answer in twelve lines after a ``lead``; with ``details`` all sentences, and the tables behind them."""
     first, *rest = explanation(d)
-    first = f"{lead} {first}".strip()
-    # it explains little and takes lines
-    last = [line for line in rest if line.startswith("Not tried: ")]
-    said, steps = d.said, _next(d)
-    named = f" {', '.join(said.effects)}" if said.effects else ""
-    out = [*textwrap.wrap(first, 110), f"verdict: {said.verdict}{named}"]
+    last = _not_tried(d)  # it explains little and takes lines
+    named = f" {', '.join(d.said.effects)}" if d.said.effects else ""
+    out = [*textwrap.wrap(f"{lead} {first}".strip(), 110), f"verdict: {d.said.verdict}{named}"]
     # a command stays in one line, to be copied
-    shown = {line: [f"  {line}"] if line.startswith("  ") else
-             textwrap.wrap(line, 110, initial_indent="  ", subsequent_indent="    ")
-             for line in rest if line not in last}  # fmt: skip
+    shown = {line: [f"  {line}"] if line.startswith("  ") else _wrapped(line) for line in rest if line not in last}
     if not details:
-        warned = [line for line in shown if line.startswith("Before any physics: ")][:1]
-        sure = [*warned, *(line for line in shown if line in steps)]
-        left = _LINES - len(out) - sum(len(shown[line]) for line in sure)
-        for line, wrapped in shown.items():
-            told = line in sure or (not line.startswith(_DETAILS) and len(wrapped) <= left)
-            left -= len(wrapped) if told and line not in sure else 0
-            out += wrapped if told else []
-        return "\n".join(out)
+        shown = _few(shown, _next(d), _LINES - len(out))
     out += [line for wrapped in shown.values() for line in wrapped]
-    out += _tables(d)
-    out += [f"  note: {note}" for note in d.problem.notes]
-    out += [textwrap.fill(line, 110, initial_indent="  ", subsequent_indent="    ") for line in last]
+    if details:
+        out += [*_tables(d), *(f"  note: {note}" for note in d.problem.notes), *map("\n".join, map(_wrapped, last))]
     return "\n".join(out)
+
+
+def _wrapped(words: str) -> list[str]:
+    return textwrap.wrap(words, 110, initial_indent="  ", subsequent_indent="    ")
+
+
+def _few(shown: Mapping[str, list[str]], steps: Sequence[str], most: int) -> dict[str, list[str]]:
+    """First remark on the files, the next steps, and of the other sentences those that fit into ``most`` lines."""
+    warned = [line for line in shown if line.startswith("Before any physics: ")][:1]
+    sure = {*warned, *steps}
+    left, told = most - sum(len(wrapped) for line, wrapped in shown.items() if line in sure), {}
+    for line, wrapped in shown.items():
+        if line in sure:
+            told[line] = wrapped
+        elif not line.startswith(_DETAILS) and len(wrapped) <= left:
+            told[line], left = wrapped, left - len(wrapped)
+    return told
 
 
 def _tables(d: Diagnosis) -> list[str]:
     """The numbers behind the sentences."""
-    found = d.found
-    size = dict(zip(d.alike.ids, d.alike.size, strict=True))
+    found, size = d.found, dict(zip(d.alike.ids, d.alike.size, strict=True))
     rows = []
     for name, p in sorted(found.probability.items(), key=lambda kv: -kv[1])[:_SHOWN]:
         seen = f"{size[str(name)]:.1f}" if str(name) in size else "-"
         odds = "-" if name not in found.states[0].log_z else f"{found.log_bayes(name):.1f}"
         rows.append(["another rotor or file" if name.doubt else str(name), f"{p:.3f}", odds, seen])
-    out = [
-        "",
-        text_table(
-            ["explanation", "probability", "ln odds over none", "typical size [sd]"], rows, left=(0,), indent="  "
-        ),
-    ]
+    header = ["explanation", "probability", "ln odds over none", "typical size [sd]"]
+    out = ["", text_table(header, rows, left=(0,), indent="  ")]
     kinds = ("before", "after", "noise", "holdout_before", "holdout_after", "gp_only")
     rows = [[c, *(f"{s[k] / s['largest']:.2%}" for k in kinds)] for c, s in d.scores.items()]
     header = ["RMSE over largest reading", "before", "after", "noise", "held out: before", "after", "smooth fit only"]
-    out += ["", text_table(header, rows, left=(0,), indent="  ")]
     h = found.states[0].hyper
     beside = "the stated or observed noise" if d.problem.u_known else "that of a typical stand (none is stated)"
-    out.append(f"\n  p = {d.p_value:.3g}; noise x{h.scale:g} {beside}, correlation {h.ar:g}, "
-               f"solver error {h.model:.0%}; {d.problem.y.size} readings")  # fmt: skip
-    return out
+    return [*out, "", text_table(header, rows, left=(0,), indent="  "),
+            f"\n  p = {d.p_value:.3g}; noise x{h.scale:g} {beside}, correlation {h.ar:g}, "
+            f"solver error {h.model:.0%}; {d.problem.y.size} readings"]  # fmt: skip

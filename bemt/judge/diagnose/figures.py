@@ -18,6 +18,7 @@ from bemt.base.page import FIRST
 from bemt.base.tables import write_atomic
 from bemt.judge.compare.first_picture import LABEL, PredictionView, against_band
 from bemt.judge.diagnose import figures_effects
+from bemt.judge.diagnose.answer import CHANNEL_WORDS
 from bemt.judge.diagnose.document import headline
 from bemt.judge.diagnose.record import CHANNELS
 from bemt.physics.dataset import Dataset
@@ -37,7 +38,6 @@ NAMES = ("residual", "before_after", "posterior", "radius", "confusion", "rankin
 LARGEST = 120_000
 """Largest file that is written [B]; a larger one loses colours."""
 
-_CHANNEL = {"thrust_N": "thrust", "torque_Nm": "torque", "rpm": "speed of rotation"}
 _COEFFICIENT = {"thrust_N": LABEL["CT"], "torque_Nm": LABEL["CP"], "rpm": "rpm [rev/min]"}
 _AXIS = {
     "J": "advance ratio J [1]", "M_tip": "tip Mach number [1]", "Re": "Reynolds number at 0.75 R [1]",
@@ -177,7 +177,7 @@ def _located(answer: Diagnosis, c: int, name: str) -> tuple[float, float] | None
 
 
 def _heading(answer: Diagnosis, c: int, region: bool) -> str:
-    text, where = _CHANNEL[CHANNELS[c]], answer.marked
+    text, where = CHANNEL_WORDS[CHANNELS[c]], answer.marked
     if region and where is not None:
         text += f": mean {100.0 * where.size:+.1f} % of the largest, in the marked region"
     return text

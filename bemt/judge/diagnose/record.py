@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -109,7 +110,7 @@ class Record:
         return replace(self, measured={c: self.measured[c] for c in kept}, u={c: self.u[c] for c in kept})
 
 
-_AIR = ("rho", "mu", "a_sound", "temperature_K")
+_AIR, _STATE = ("rho", "mu", "a_sound", "temperature_K"), ("density_kg_m3", "pressure_Pa", "temperature_K")
 NO_SPEED = "rpm: not recorded"
 """Start of the note of a recording that takes the speed of the case."""
 POWER_OPEN = "electrical power is left out: it needs a run of the same motor and controller, --reference RUN"
@@ -240,33 +241,24 @@ def _states(values: Mapping[str, Array], case: Case, notes: list[str], file: str
     """Air per point: density, or pressure and temperature, of the recording; else of the case."""
     n = len(values["rpm"])
     default = case.air()
-    rho, temperature = values.get("density_kg_m3"), values.get("temperature_K")
-    pressure = values.get("pressure_Pa")
     _plausible(values, file)
     fields = {key: np.full(n, float(getattr(default, key))) for key in _AIR}
+    made = cache(lambda of, value, kelvin: of(value, kelvin - ZERO_CELSIUS))
     recorded = False
-    cache: dict[tuple[float, ...], Air] = {}
     for i in range(n):
-        t = temperature[i] if temperature is not None and np.isfinite(temperature[i]) else fields["temperature_K"][i]
-        if rho is not None and np.isfinite(rho[i]):
-            key: tuple[float, ...] = (0.0, float(rho[i]), float(t))
-            if key not in cache:
-                cache[key] = Air.from_density(key[1], key[2] - ZERO_CELSIUS)
-        elif pressure is not None and np.isfinite(pressure[i]):
-            key = (1.0, float(pressure[i]), float(t))
-            if key not in cache:
-                cache[key] = Air.from_state(key[1], key[2] - ZERO_CELSIUS)
-        elif temperature is not None and np.isfinite(temperature[i]):
-            # pressure of the case, temperature of the recording
-            key = (2.0, float(t))
-            if key not in cache:
-                ratio = float(default.temperature_K) / key[1]
-                cache[key] = Air.from_density(float(default.rho) * ratio, key[1] - ZERO_CELSIUS)
+        told = {k: float(values[k][i]) for k in _STATE if k in values and np.isfinite(values[k][i])}
+        T = told.get("temperature_K", float(default.temperature_K))
+        if "density_kg_m3" in told:
+            air = made(Air.from_density, told["density_kg_m3"], T)
+        elif "pressure_Pa" in told:
+            air = made(Air.from_state, told["pressure_Pa"], T)
+        elif told:  # pressure of the case, temperature of the recording
+            air = made(Air.from_density, float(default.rho) * (float(default.temperature_K) / T), T)
         else:
             continue
-        recorded = recorded or key[0] < 2.0
+        recorded = recorded or len(told) > ("temperature_K" in told)
         for name in _AIR:
-            fields[name][i] = float(getattr(cache[key], name))
+            fields[name][i] = float(getattr(air, name))
     if not recorded:
         notes.append(f"density: not recorded; {float(default.rho):.4g} kg/m3 of the case")
     return air_of_points(fields), recorded

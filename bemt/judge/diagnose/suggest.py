@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,8 +18,9 @@ from bemt.base.units import ZERO_CELSIUS, suffixes
 from bemt.data.readers.left_open import kept_beside
 from bemt.data.readers.recording_toml import QUANTITIES
 from bemt.data.recordings.shown import options_of
-from bemt.judge.compare.change_document import AIR_OF_BOTH, DAYS, title_of
-from bemt.judge.compare.one_run import other_fluid
+from bemt.judge.compare.change_document import AIR_OF_BOTH, DAYS
+from bemt.judge.compare.drive_laws import title_of
+from bemt.judge.compare.slips import other_fluid
 from bemt.judge.diagnose import noise
 from bemt.judge.diagnose.assemble import assemble
 from bemt.judge.diagnose.form import ALIKE
@@ -44,12 +46,6 @@ REFERENCE = (
 
 WHOSE = "state the rotor that was measured: its label, or its diameter, pitch and blades in the case"
 """Where another rotor fits the readings better than that of the case."""
-
-ROTOR = (
-    "measure diameter and pitch and count the blades; with a run that is known to be right, calibrate the rotor and "
-    "diagnose again with that run as reference"
-)
-"""What comes before any cause where all loads are off by a quarter."""
 
 # Tip Mach number from which incompressible flow is some per cent off.
 _COMPRESSIBLE = 0.3
@@ -116,14 +112,14 @@ class Suggestion:
     """A run, and what it would do."""
 
     text: str  # What to do
-    points: tuple[dict[str, float], ...]  # Operating points: rpm, airspeed_m_s and what else is set
-    separates: tuple[str, ...]  # The two explanations
-    # Distance of the two in standard deviations, now and with the run [1]
-    before: float
-    after: float
     # "run", "reference" (a run without the cause), "look" (a check or a correction without a run), "mend" (the
     # recording), "case" (state the rotor), "air" (write it down), "cfd" (compute again), or "" for nothing
-    kind: str = "run"
+    kind: str
+    points: tuple[dict[str, float], ...] = ()  # Operating points: rpm, airspeed_m_s and what else is set
+    separates: tuple[str, ...] = ()  # The two explanations
+    # Distance of the two in standard deviations, now and with the run [1]
+    before: float = 0.0
+    after: float = 0.0
     commands: tuple[str, ...] = ()  # What to type then; after a check, if the effect is not there
     checks: str = ""  # Effect that a check looks for
     minutes: float = 0.0  # Time that it takes on a stand [min]
@@ -142,8 +138,7 @@ class Suggestion:
         """Plain values for JSON."""
         return {"text": self.text, "points": [dict(p) for p in self.points], "separates": list(self.separates),
                 "distance_before": self.before, "distance_after": self.after, "kind": self.kind,
-                "commands": list(self.commands), "checks": self.checks, "minutes": self.minutes,
-                "gain": self.gain,
+                "commands": list(self.commands), "checks": self.checks, "minutes": self.minutes, "gain": self.gain,
                 "otherwise": None if self.otherwise is None else self.otherwise.document()}  # fmt: skip
 
 
@@ -172,13 +167,13 @@ def _options(part: Part) -> list[_Option]:
         return _Option(text, rpm, V, change or {}, {k: np.full(rpm.size, v) for k, v in {**now, **extra}.items()})
 
     static, same = np.zeros(_POINTS), np.full(_POINTS, middle)
+    again = f"repeat {low:.0f} to {high:.0f} rev/min"
     out = [
         at(f"static runs (no airspeed) at {low:.0f} to {high:.0f} rev/min", spread, static),
-        at(f"repeat {low:.0f} to {high:.0f} rev/min in air 15 % thinner (altitude, or a hot day)", spread, static,
-           {"rho": 0.85}),
-        at(f"repeat {low:.0f} to {high:.0f} rev/min at 5 C instead of 35 C (cold air, same density)", spread, static,
+        at(f"{again} in air 15 % thinner (altitude, or a hot day)", spread, static, {"rho": 0.85}),
+        at(f"{again} at 5 C instead of 35 C (cold air, same density)", spread, static,
            {"a_sound": (278.15 / 308.15) ** 0.5}),
-        at("repeat the first points after 30 minutes of running", spread, static, None,
+        at("repeat the first points after 30 minutes of running", spread, static,
            time_s=now.get("time_s", 0.0) + 1800.0),
     ]  # fmt: skip
     slow = max(0.4 * low, _SLOWEST * high)
@@ -190,16 +185,14 @@ def _options(part: Part) -> list[_Option]:
         out.append(at(f"runs in wind at {middle:.0f} rev/min, J 0.2 to {1.15 * J0:.2f}", same, wind))
     up = min(1.3, 0.85 / max(tip, 1e-6), record.top_rpm / high)
     if tip < 0.75 and up >= _FASTER:
-        out.append(
-            at(f"faster: static at {high:.0f} to {up * high:.0f} rev/min", np.linspace(1.0, up, _POINTS) * high, static)
-        )
+        faster = np.linspace(1.0, up, _POINTS) * high
+        out.append(at(f"faster: static at {high:.0f} to {up * high:.0f} rev/min", faster, static))
     if "wall_distance_m" in record.extra:
-        out.append(at(f"the same static runs with the wall {8 * f.R:.2f} m away", spread, static, None,
-                      wall_distance_m=8 * f.R))  # fmt: skip
+        text = f"the same static runs with the wall {8 * f.R:.2f} m away"
+        out.append(at(text, spread, static, wall_distance_m=8 * f.R))
     if f.ducted and "tip_gap_m" in record.extra:
-        out.append(
-            at("the same static runs with twice the tip gap", spread, static, None, tip_gap_m=2 * now["tip_gap_m"])
-        )
+        text = "the same static runs with twice the tip gap"
+        out.append(at(text, spread, static, tip_gap_m=2 * now["tip_gap_m"]))
     once = _once_each(part)
     own = {k: v[once] for k, v in record.extra.items() if k not in ("run", "time_s")}
     return [*out, _Option(f"the same {once.size} points once more", record.rpm[once], record.V[once], {}, own)]
@@ -230,10 +223,8 @@ def _extended(alone: Problem, option: _Option) -> Problem:
     both = air_of_points({k: join([getattr(old.air, k), air[k]]) for k in air})
     plain = [e for e in part.baseline if not bem.acts_on_points(e)]
     flow = bem.flow_of(part.model.prepared(plain), rpm, V, both, extra, part.flow.chord)
-    filled = {}
-    for c, values in (("thrust_N", flow.T0), ("torque_Nm", flow.Q0)):
-        if c in old.measured:
-            filled[c] = join([old.measured[c], values[-option.rpm.size :]])
+    new = {"thrust_N": flow.T0, "torque_Nm": flow.Q0}
+    filled = {c: join([old.measured[c], v[-option.rpm.size :]]) for c, v in new.items() if c in old.measured}
     u = {c: join([old.u[c], np.full(option.rpm.size, np.nan)]) for c in filled}
     record = Record(old.name, rpm, V, both, filled, u, extra, old.gain, old.zero, old.air_recorded)
     return assemble((replace(part, record=record, flow=flow, _solved={}),), like=alone)
@@ -243,7 +234,7 @@ def _of_cfd(found: Evidence) -> Suggestion:
     """What a study of CFD has for a next run: no stand, no other specimen, a set-up that may move the loads itself."""
     part = found.problem.parts[0]
     if not part.record.air_recorded and (fluid := _other_fluid(found.problem)):
-        return Suggestion(fluid, (), (), 0.0, 0.0, "cfd")
+        return Suggestion(fluid, "cfd")
     steps = ["a finer grid (cells x 2 or more)", "a larger domain"]
     steps += ["compressible air"] if float(np.max(part.flow.M_tip)) > _COMPRESSIBLE else []
     fastest = int(np.argmax(part.record.rpm))
@@ -251,7 +242,7 @@ def _of_cfd(found: Evidence) -> Suggestion:
     text = (
         f"one point again, {point['rpm']:.0f} rev/min, with {', with '.join(steps)}: what moves the loads is the set-up"
     )
-    return Suggestion(text, (point,), (), 0.0, 0.0, "cfd")
+    return Suggestion(text, "cfd", (point,))
 
 
 def _other_fluid(problem: Problem) -> str:
@@ -274,11 +265,9 @@ def _points(record: Record, option: _Option) -> tuple[dict[str, float], ...]:
     if option.change:
         changed = {"density_kg_m3": rho, "temperature_C": T - ZERO_CELSIUS, "pressure_Pa": rho * R_DRY * T}
     units = {"time_s": ("time_s", 1.0), "wall_distance_m": ("wall_distance_m", 1.0), "tip_gap_m": ("tip_gap_mm", 1e3)}
-    out = []
-    for k in range(option.rpm.size):
-        more = {new: float(option.extra[old][k]) * f for old, (new, f) in units.items() if old in option.extra}
-        out.append({"rpm": float(option.rpm[k]), "airspeed_m_s": float(option.V[k]), **changed, **more})
-    return tuple(out)
+    more = {new: option.extra[old] * f for old, (new, f) in units.items() if old in option.extra}
+    return tuple({"rpm": float(rpm), "airspeed_m_s": float(V), **changed, **{k: float(v[i]) for k, v in more.items()}}
+                 for i, (rpm, V) in enumerate(zip(option.rpm, option.V, strict=True)))  # fmt: skip
 
 
 def nothing_called_for(found: Evidence, rivals: Sequence[Rival], unknown: float) -> Suggestion:
@@ -287,30 +276,30 @@ def nothing_called_for(found: Evidence, rivals: Sequence[Rival], unknown: float)
     Nobody can take friction or compressibility away for a reference: a run that removes doubt is the other way.
     """
     if found.problem.parts[0].record.computed:
-        return Suggestion("no further run is needed", (), (), 0.0, 0.0, "")
+        return Suggestion("no further run is needed", "")
     if _referenced(found):
-        return weather(found) or Suggestion("no further run is needed", (), (), 0.0, 0.0, "")
+        return weather(found) or Suggestion("no further run is needed", "")
     best = suggest(found, rivals, unknown, reference=True)
     run = next((s for s in (best, best.otherwise) if s and s.kind == "run" and s.gain), None)
     level = max((abs(v) for v in found.problem.level.values()), default=0.0)
     text = "no further run is needed; with a reference run (the same rotor before the change) weaker causes would show"
     if level > LEVEL:
         text = f"{REFERENCE}; it shows whether the level comes from blade, stand or model"
-    return Suggestion(text, (), (), 0.0, 0.0, "reference", otherwise=run)
+    return Suggestion(text, "reference", otherwise=run)
 
 
 def mended(found: Evidence, what: str, kind: str = "mend") -> Suggestion:
     """Put the recording right; where nothing is wrong with it, only a reference shows what else it may be."""
     known = _referenced(found) or found.problem.parts[0].record.computed
-    reference = None if known else Suggestion(REFERENCE, (), (), 0.0, 0.0, "reference")
-    return Suggestion(what, (), (), 0.0, 0.0, kind, otherwise=reference)
+    reference = None if known else Suggestion(REFERENCE, "reference")
+    return Suggestion(what, kind, otherwise=reference)
 
 
 def weather(found: Evidence) -> Suggestion | None:
     """Air to be written down, where a run differs from its reference and nobody knows the air of both."""
     known = all(p.record.air_recorded for p in found.problem.parts)
     apart = 0.0 if known else _apart(found.problem)
-    return Suggestion(DAYS, (), (), 0.0, 0.0, "air") if _DAYS[0] < apart < _DAYS[1] else None
+    return Suggestion(DAYS, "air") if _DAYS[0] < apart < _DAYS[1] else None
 
 
 def _apart(problem: Problem) -> float:
@@ -363,60 +352,67 @@ def suggest(found: Evidence, rivals: Sequence[Rival], unknown: float = 0.0, refe
     pairwise bound on Bayes' error; discrimination of rival models: Hunter and Reiner, Technometrics 7, 1965, p. 307;
     Box and Hill, Technometrics 9, 1967, p. 57; neither checked). That a reference settles the unknown is an assumption.
     """
-    from scipy.special import ndtr
-
     if found.problem.parts[0].record.computed:
         return _of_cfd(found)
-    hyper, problem = found.states[0].hyper, found.problem
-    effect = [None if not r.effect else effect_of(r.effect, dict(r.settings)) for r in rivals]
-    p = np.array([max(r.probability, _LEAST) for r in rivals])
-    share = p / (p.sum() + unknown)
-    doubt = np.outer(share, share) - np.diag(share**2)
-    of_unknown = 2.0 * float(share.sum()) * unknown / (p.sum() + unknown)
-    total = float(doubt.sum()) + of_unknown
-
-    part = problem.parts[0]
-    alone = problem if len(problem.parts) == 1 else assemble(problem.parts[:1])
-    now = _distances(alone, effect, hyper)
-    names = tuple(r.effect or "nothing" for r in rivals[:2])
-    before = float(now[0, 1])
-
-    def choice(text: str, points: tuple[dict[str, float], ...], plan: Problem, kind: str, time: float) -> Suggestion:
-        there = _distances(plan, effect, hyper)
-        told = np.sqrt(np.maximum(there**2 - now**2, 0.0))
-        taken = float(np.sum(doubt * (1.0 - 2.0 * ndtr(-0.5 * told))))
-        gain = (taken + (of_unknown if kind == "reference" else 0.0)) / total if total > 0.0 else 0.0
-        return Suggestion(text, points, names, before, float(there[0, 1]), kind, minutes=time, gain=gain)
-
-    choices = []
-    for tried in _options(part):
-        try:
-            choices.append(choice(tried.text, _points(part.record, tried), _extended(alone, tried), "run",
-                                  minutes("run", tried.rpm.size)))  # fmt: skip
-        except (ValueError, FloatingPointError):
-            continue
-    if reference and not _referenced(found):
-        time = minutes("reference", len(part.record))
-        choices.append(choice(REFERENCE, (), _with_reference(part), "reference", time))
+    lacking = reference and not _referenced(found)
+    choices, total, before = _choices(found, rivals, unknown, lacking)
     # a run that leaves the two leading explanations alike is not worth it; what is told apart is rather looked at
-    able = [c for c in choices if c.gain * total >= _WORTH and (c.kind == "reference" or c.after >= _ENOUGH)]
+    worth = [c for c in choices if c.gain * total >= _WORTH]
+    able = [c for c in worth if c.kind == "reference" or c.after >= _ENOUGH]
     able.sort(key=lambda c: -c.gain / c.minutes)
     certain = before >= _ENOUGH and not reference
-    looked = look(names if total >= _WORTH else names[:1], part.record)  # without doubt there is no rival to rule out
-    worth = [c for c in choices if c.kind == "run" and c.gain * total >= _WORTH]
+    # without doubt there is no rival to rule out
+    names = [r.effect or "nothing" for r in rivals[: 2 if total >= _WORTH else 1]]
+    looked = look(names, found.problem.parts[0].record)
     # where no run is able to, one that tells only the others apart is better than nothing
-    instead = looked or max(worth, key=lambda c: c.gain / c.minutes, default=None)
+    runs = [c for c in worth if c.kind == "run"]
+    instead = looked or max(runs, key=lambda c: c.gain / c.minutes, default=None)
     if able and not (looked and certain):
         other = next((c for c in able if c.kind != able[0].kind), instead if able[0].kind == "reference" else None)
         return replace(able[0], otherwise=other)
     if looked:
         return replace(looked, before=before, after=before)
     if certain:
-        return Suggestion("no further run is needed; none would tell more", (), (), before, before, "")
-    if reference and not _referenced(found):
+        return Suggestion("no further run is needed; none would tell more", "", before=before, after=before)
+    if lacking:
         return replace(choices[-1], otherwise=instead)
     nothing = "no run that this stand can make separates them; the same points once more would not, either"
-    return instead or Suggestion(nothing, (), (), before, before, "")
+    return instead or Suggestion(nothing, "", before=before, after=before)
+
+
+def _choices(
+    found: Evidence, rivals: Sequence[Rival], unknown: float, lacking: bool
+) -> tuple[list[Suggestion], float, float]:  # fmt: skip
+    """Runs with what each takes away, the doubt that there is, and the distance of the two leading explanations."""
+    from scipy.special import ndtr
+
+    hyper, part = found.states[0].hyper, found.problem.parts[0]
+    effect = [None if not r.effect else effect_of(r.effect, dict(r.settings)) for r in rivals]
+    names = tuple(r.effect or "nothing" for r in rivals[:2])
+    p = np.array([max(r.probability, _LEAST) for r in rivals])
+    share = p / (p.sum() + unknown)
+    doubt = np.outer(share, share) - np.diag(share**2)
+    of_unknown = 2.0 * float(share.sum()) * unknown / (p.sum() + unknown)
+    total = float(doubt.sum()) + of_unknown
+    alone = found.problem if len(found.problem.parts) == 1 else assemble(found.problem.parts[:1])
+    now = _distances(alone, effect, hyper)
+
+    def choice(text: str, kind: str, plan: Problem, points: int, at: tuple[dict[str, float], ...] = ()) -> Suggestion:
+        there = _distances(plan, effect, hyper)
+        told = np.sqrt(np.maximum(there**2 - now**2, 0.0))
+        taken = float(np.sum(doubt * (1.0 - 2.0 * ndtr(-0.5 * told))))
+        gain = (taken + (of_unknown if kind == "reference" else 0.0)) / total if total > 0.0 else 0.0
+        return Suggestion(text, kind, at, names, float(now[0, 1]), float(there[0, 1]), minutes=minutes(kind, points),
+                          gain=gain)  # fmt: skip
+
+    choices = []
+    for run in _options(part):
+        with suppress(ValueError, FloatingPointError):
+            plan = _extended(alone, run)
+            choices.append(choice(run.text, "run", plan, run.rpm.size, _points(part.record, run)))
+    if lacking:
+        choices.append(choice(REFERENCE, "reference", _with_reference(part), len(part.record)))
+    return choices, total, float(now[0, 1])
 
 
 def _distances(plan: Problem, of: Sequence[effects.Effect | None], hyper: noise.Hyper) -> Array:
@@ -435,8 +431,7 @@ def look(names: Sequence[str], record: Record) -> Suggestion | None:
         return None
     known = effects.catalogue()
     check, aim, name = min(aims, key=lambda one: (known[one[2]].evident, known[one[2]].check_minutes))
-    return Suggestion(f"to {aim} {title_of(name)}, {check}", (), (), 0.0, 0.0, "look", checks=name,
-                      minutes=known[name].check_minutes)  # fmt: skip
+    return Suggestion(f"to {aim} {title_of(name)}, {check}", "look", checks=name, minutes=known[name].check_minutes)
 
 
 def correction(names: Sequence[str], settings: Mapping[str, Mapping[str, Any]], record: Record) -> Suggestion | None:
@@ -449,7 +444,7 @@ def correction(names: Sequence[str], settings: Mapping[str, Mapping[str, Any]], 
         if float(found.get("factor", 1.0)) < 0.0 and "channel" in found:
             what = "both loads" if found["channel"] == LOADS else found["channel"]
             text = f"reverse the sign of {what} (sign = -1 in a recording.toml), or turn the sensor round"
-        return Suggestion(text, (), (), 0.0, 0.0, "look", _restated(found, record))
+        return Suggestion(text, "look", commands=_restated(found, record))
     return None
 
 

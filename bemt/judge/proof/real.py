@@ -126,8 +126,8 @@ def pair_files(a: str, b: str) -> dict[str, str] | None:
     found = {name: path for name, path in places if path.is_file()}
     if len(found) < len({a, b}):
         return None
-    texts = [_text(found[name], name) for name in (a, b)]
-    return {"reference.csv": texts[0], "recording.csv": texts[1], "compare": "A reference, B recording\n"}
+    return {"reference.csv": _text(found[a], a), "recording.csv": _text(found[b], b),
+            "compare": "A reference, B recording\n"}  # fmt: skip
 
 
 def _plain(path: Path, how: _Recorded) -> dict[str, Array]:
@@ -144,8 +144,7 @@ def _plain(path: Path, how: _Recorded) -> dict[str, Array]:
         }
     if how.half:
         command = next(iter(columns.values()))
-        drop = np.flatnonzero(np.diff(command) < 0.0)
-        top = int(drop[0]) + 1 if drop.size else command.size
+        top = next(iter(np.flatnonzero(np.diff(command) < 0.0) + 1), command.size)
         part = slice(0, top) if how.half == "up" else slice(top, None)
         columns = {k: v[part] for k, v in columns.items()}
     if "rpm" in columns:
@@ -188,12 +187,12 @@ def _read(path: Path, how: _Recorded) -> dict[str, Array]:
             columns["pulse_width_s" if run.command == "pwm_s" else run.command] = run.points.command
     n = next(iter(columns.values())).size
     columns |= {k: np.full(n, float(v)) for k, v in how.constant.items()}
-    load = [np.isfinite(columns[k]) for k in ("thrust_N", "torque_Nm") if k in columns]
-    good = np.any(load, axis=0) & np.isfinite(columns.get("rpm", np.ones(n)))
+    loads = [np.isfinite(columns[k]) for k in ("thrust_N", "torque_Nm") if k in columns]
+    good = np.any(loads, axis=0) & np.isfinite(columns.get("rpm", np.ones(n)))
     return {k: v[good] for k, v in columns.items() if np.isfinite(v[good]).any()}
 
 
-def _case_of_label(label: Mapping[str, Any]) -> str:
+def _case_of_label(label: Mapping[str, Any], name: str = "label") -> str:
     """Case of a label: an APC-like blade where nothing more is known."""
     fan = "chord_law" in label
     rotor: dict[str, Cell] = {"kind": "propeller", "blades": label["blades"], "hub_ratio": label.get("hub_ratio", 0.1)}
@@ -203,7 +202,7 @@ def _case_of_label(label: Mapping[str, Any]) -> str:
     section: dict[str, Cell] = {"camber": 0.05, "thickness": 0.09} if fan else {"camber": 0.04, "thickness": 0.10}
 
     operating = {"rpm": label["rpm"], "airspeed_m_s": 0.0}
-    return case_text("label", {"rotor": rotor, "blade": blade, "blade.section": section, "operating": operating,
+    return case_text(name, {"rotor": rotor, "blade": blade, "blade.section": section, "operating": operating,
                                "air": {"density_kg_m3": 1.2}}, "g")  # fmt: skip
 
 
@@ -375,8 +374,7 @@ def _x22a() -> Iterator[Item]:
         return
     R = 1.0668
     shape = np.genfromtxt(root / "x22a_geometry.csv", delimiter=",", skip_header=1)
-    with (root / "x22a_measured_CT_CP_vs_J.csv").open(encoding="utf-8") as stream:
-        rows = np.array([[float(x) for x in row[:4]] for row in list(csv.reader(stream))[1:]])
+    rows = np.genfromtxt(root / "x22a_measured_CT_CP_vs_J.csv", delimiter=",", skip_header=1, usecols=range(4))
     rotor: dict[str, Cell] = {"kind": "propeller", "blades": 3, "diameter_m": 2 * R, "hub_ratio": 0.2}
     for angle in (19, 29):
         q = rows[rows[:, 0] == angle]
@@ -392,8 +390,7 @@ def _caradonna_tung() -> Iterator[Item]:
     root = find_data("caradonna_tung")
     if root is None:
         return
-    with (root / "caradonna_tung_CT_vs_tipMach.csv").open(encoding="utf-8") as stream:
-        rows = np.array([[float(x) for x in row[:4]] for row in list(csv.reader(stream))[1:]])
+    rows = np.genfromtxt(root / "caradonna_tung_CT_vs_tipMach.csv", delimiter=",", skip_header=1, usecols=range(4))
     r_R = np.linspace(0.18, 1.0, 10)
     rotor: dict[str, Cell] = {"kind": "propeller", "blades": 2, "diameter_m": 2.286, "hub_ratio": 0.17}
     for angle in np.unique(rows[:, 0]):
@@ -427,26 +424,7 @@ def _tmotor() -> Iterator[Item]:
         yield _item(kind, "tmotor_28", columns, text, blade, [])
 
 
-_FAN = """schema = "bemt.case/1"
-name = "fan_76"
-[rotor]
-kind = "propeller"
-blades = 8
-diameter_mm = 76
-hub_ratio = 0.25
-[blade]
-pitch_mm = 70
-chord_law = "fan"
-max_chord_over_R = 0.35
-[blade.section]
-camber = 0.05
-thickness = 0.09
-[operating]
-rpm = 20000
-airspeed_m_s = 0
-[air]
-density_kg_m3 = 1.2
-"""
+_FAN = {"blades": 8, "diameter_mm": 76, "hub_ratio": 0.25, "pitch_mm": 70, "chord_law": "fan", "rpm": 20000}
 
 
 def _fan() -> Iterator[Item]:
@@ -464,7 +442,7 @@ def _fan() -> Iterator[Item]:
         keys = ("rpm", "thrust_N", "torque_Nm")
         run = np.concatenate([np.full(part["rpm"].size, float(k)) for k, part in enumerate(parts)])
         found[name] = {"run": run, **{k: np.concatenate([part[k] for part in parts]) for k in keys}}
-    yield _item("real duct", "fan_76", found["ducted"], _FAN, "", ["rpm"], found["open"])
+    yield _item("real duct", "fan_76", found["ducted"], _case_of_label(_FAN, "fan_76"), "", ["rpm"], found["open"])
 
 
 def draw_real(rng: np.random.Generator) -> list[Item]:

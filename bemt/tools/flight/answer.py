@@ -230,7 +230,7 @@ def _not_flown(log: FlightLog) -> FlightVerdict:
     step = "log a flight of 10 s or more with the commands of the motors (ArduPilot RCOU or RATE, PX4 " \
            "actuator_motors, a Crazyflie's motor.m1 to m4)"  # fmt: skip
     said = Decision("insufficient", (), NONE, 1.0, why)
-    return FlightVerdict(said, np.zeros(0), Suggestion(step, (), (), 0.0, 0.0, "run"))
+    return FlightVerdict(said, np.zeros(0), Suggestion(step, "run"))
 
 
 def _by_healthy(

@@ -140,7 +140,7 @@ def judge(
         step = "weigh the vehicle and charge the battery, then hover 30 s; --healthy-mass-kg, the mass of the " \
                "healthy flights, gives that of this one"  # fmt: skip
         said = replace(sure.said, why="the motors share the work as in healthy flights")
-        out = replace(out, said=said, next=Suggestion(step, (), (), 0.0, 0.0, "run"))
+        out = replace(out, said=said, next=Suggestion(step, "run"))
     if n < 3:
         return out
     bad, several = [], np.unique(label).size > 1
@@ -414,7 +414,7 @@ def next_flight(said: Decision, layout: NDArray[np.float64] | None, given: int, 
     looked = f"look at the propeller{several} of motor{several} {' and '.join(map(str, motors))}"
     needed = _flight_needed(said, given, looked if motors else "", ask_day)
     text, kind = needed or _look_needed(said, motors, looked, layout)
-    return Suggestion(text, (), said.effects[:2], 0.0, 0.0, kind)
+    return Suggestion(text, kind, separates=said.effects[:2])
 
 
 def _flight_needed(said: Decision, given: int, looked: str, ask_day: bool) -> tuple[str, str] | None:
