@@ -7,10 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
+import bemt
 from bemt.app import cli
 from bemt.base.errors import InputError
+from bemt.data.recordings.check import check
+from bemt.data.recordings.load import import_file
 from bemt.rotors import k1k2_calibration as calibrate
 from bemt.rotors import k1k2_calibration as fit
 from bemt.rotors import k1k2_points as gather
@@ -263,3 +267,82 @@ def test_a_file_is_fitted_once_and_never_held_out_too(tmp_path, capsys):
             and not said.out
             and not out.exists()
         )
+
+
+def bench(K1=0.31, K2=1.4) -> pd.DataFrame:
+    """A stand's table of eight propellers that follow K1/K2 exactly."""
+    rows = []
+    for d, p in SIZES[:8]:
+        D, pitch = d * INCH, p * INCH
+        T = np.pi / 4.0 * 1.2 * (RPM / 60.0) ** 2 * D**2 * pitch**2 * (K1 * d / p) ** K2
+        rows += [(d, p, n, t, 1.2) for n, t in zip(RPM, T, strict=True)]
+    return pd.DataFrame(rows, columns=["diameter_in", "pitch_in", "rpm", "thrust_N", "density_kg_m3"])
+
+
+@pytest.mark.parametrize(
+    ("column", "factor", "words"),
+    [
+        ("diameter_in", 25.4, "mm taken for in: multiply by 0.0393701"),
+        ("thrust_N", 1000.0 / 9.80665, "gf taken for N: multiply by 0.00980665"),
+        ("rpm", 7.0, "electrical revolutions over"),
+    ],
+)
+def test_a_slip_of_units_is_named_and_not_fitted(tmp_path: Path, column: str, factor: float, words: str):
+    frame = bench()
+    frame[column] = frame[column] * factor
+    frame.to_csv(tmp_path / "a.csv", index=False)
+    for rows in (frame, tmp_path / "a.csv", frame[::4]):  # one row of each propeller too
+        with pytest.raises(InputError, match=words):
+            bemt.calibrate(rows)
+    assert any(words in f.correction for f in check(import_file(tmp_path / "a.csv")))  # `import` says it as well
+    one = bench().astype(float)
+    at = one.diameter_in == 8
+    one.loc[at, column] = one.loc[at, column] * factor
+    found = bemt.calibrate(one).to_dict()
+    assert any(words in line for line in found["refused"])
+    assert found["k1k2"]["refit"]["propellers"] == 6 and found["k1k2"]["refit"]["K1"] == pytest.approx(0.31, abs=1e-9)
+
+
+def test_every_row_that_is_left_out_is_named(tmp_path: Path):
+    frame = bench()
+    frame["rpm"] = frame["rpm"].astype(float)
+    frame.loc[1, "thrust_N"], frame.loc[6, "rpm"], frame.loc[9, "thrust_N"] = np.nan, 0.0, -3.0
+    frame.to_csv(tmp_path / "a.csv", index=False)
+    told = bemt.calibrate(tmp_path / "a.csv")
+    doc, page = told.to_dict(), told.text
+    assert doc["k1k2"]["refit"]["points"] == len(frame) - 3
+    for line, reason in ((3, "no load"), (8, "reads 0 while the rotor turns"), (11, "lowest -3 N")):
+        rows = [words for words in (*doc["refused"], *doc["notes"]) if reason in words and str(line) in words]
+        assert rows and all(words in page for words in rows), (line, reason)
+
+
+def test_reversed_thrust_is_said():
+    points = planted()
+    down = replace(points, CT=np.where(points.index == 3, -points.CT, points.CT))
+    assert "4 points without forward thrust: neither fitted nor scored" in calibrate.calibrate(down, None).notes
+
+
+def test_it_reads_what_every_reader_reads(tmp_path: Path):
+    frame = bench()
+    truth = bemt.calibrate(frame).to_dict()["k1k2"]
+    assert truth["refit"]["K1"] == pytest.approx(0.31, abs=1e-9)
+    labels = [f"{d:g}x{p:g}" for d, p in zip(frame.diameter_in, frame.pitch_in, strict=True)]
+    rest = frame.drop(columns=["diameter_in", "pitch_in"])
+    doors = {
+        "label.csv": rest.assign(Propeller=labels),
+        "omega.csv": frame.assign(omega_rad_s=frame.rpm * np.pi / 30).drop(columns="rpm"),
+        "grams.csv": frame.assign(Thrust_g=frame.thrust_N / 9.80665e-3).drop(columns="thrust_N"),
+    }
+    for name, table in doors.items():
+        table.to_csv(tmp_path / name, index=False)
+        for given in (tmp_path / name, table) if name != "grams.csv" else (tmp_path / name,):
+            found = bemt.calibrate(given).to_dict()["k1k2"]["refit"]
+            assert (found["K1"], found["K2"]) == pytest.approx((0.31, 1.4), abs=1e-9), name
+    one = rest[:4]
+    one.to_csv(tmp_path / "one.csv", index=False)
+    with pytest.raises(InputError, match=r"no column diameter.*label=10x4.5"):
+        bemt.calibrate(tmp_path / "one.csv")
+    found = bemt.calibrate(tmp_path / "one.csv", label="8x4").to_dict()
+    assert found["data"]["calibration"]["points"] == 4
+    made = gather.load([tmp_path / "one.csv"], label="8x4x3").propellers[0]
+    assert (made.diameter_m, made.pitch_m, made.blades) == (pytest.approx(8 * INCH), pytest.approx(4 * INCH), 3)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.base.document import Documented
 from bemt.base.errors import Fault, InputError
-from bemt.base.tables import json_text, text_table, write_atomic
+from bemt.base.tables import json_text, number_of, text_table, write_atomic
 from bemt.base.units import INCH
 from bemt.physics import k1k2 as empirical
 from bemt.rotors.k1k2_points import FitPoints
@@ -289,6 +289,8 @@ def calibrate(
 ) -> Calibration:  # fmt: skip
     """Fit, leave out, score; the names of the files stand in the document."""
     notes = [*points.notes, *(test.notes if test else ())]
+    down = int(sum(np.sum(p.CT <= 0.0) for p in (points, test) if p))
+    notes += [f"{number_of(down, 'point')} without forward thrust: neither fitted nor scored"] if down else []
     progress("K1 and K2")
     k1k2 = _k1k2(points, DRAWS, notes)
     CT = {key: CT_k1k2(points, c.K1, c.K2) for key, c in k1k2.items()}
