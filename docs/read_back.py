@@ -321,8 +321,9 @@ to 10,000 rev/min; `dfdc` uses the fan `ds30`.
 {chr(10).join(kinds["loads"])}
 
 The errors are those of the model class, from static to zero thrust. Targets of one or three numbers err with speed,
-too: give `--rpm` near the speed you fly. A single constant (`gazebo`) is within {still:.0f} % at rest and off by the
-whole thrust in flight. Beyond the tables programs hold the last value.
+too: `--rpm`, the speed you fly, is where they have the static loads of BEMT; their range stays that of the case. A
+single constant (`gazebo`) is within {still:.0f} % at rest and off by the whole thrust in flight. Beyond the tables
+programs hold the last value.
 
 ### From rest, at the program's own step
 

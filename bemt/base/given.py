@@ -20,6 +20,8 @@ def numbers(name: str, value: Any, finite: bool = True) -> Array:
     wrong = Fault("", name, f"{type(value).__name__} {value!r:.60}", "a number, or several")
     try:
         raw = np.asarray(value)
+        if np.iscomplexobj(raw):  # numpy would leave out what is imaginary
+            raise TypeError
         text = raw.dtype.kind in "USTbM"
         text |= raw.dtype.kind == "O" and any(isinstance(v, (str, bytes, bool)) for v in raw.flat)
         found = np.asarray(raw, dtype=float)
