@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,9 +16,12 @@ from bemt.app import cli
 from bemt.base.errors import InputError
 from bemt.data.recordings.check import check
 from bemt.data.recordings.load import import_file
+from bemt.physics import k1k2
 from bemt.rotors import k1k2_calibration as calibrate
 from bemt.rotors import k1k2_calibration as fit
 from bemt.rotors import k1k2_points as gather
+from bemt.rotors.case import load_case
+from bemt.rotors.case.prepare import k1k2_case
 from bemt.rotors.k1k2_points import FitPoints, MeasuredPropeller
 
 INCH = 0.0254
@@ -346,3 +350,29 @@ def test_it_reads_what_every_reader_reads(tmp_path: Path):
     assert found["data"]["calibration"]["points"] == 4
     made = gather.load([tmp_path / "one.csv"], label="8x4x3").propellers[0]
     assert (made.diameter_m, made.pitch_m, made.blades) == (pytest.approx(8 * INCH), pytest.approx(4 * INCH), 3)
+
+
+def test_fitted_constants_go_into_a_case(tmp_path: Path):
+    """What the page prints for `[model]` is what the K1/K2 column of the case then uses, with its u."""
+    told = bemt.calibrate(bench(0.35, 1.3))
+    (line,) = (line for line in told.text.splitlines() if line.startswith("For the K1/K2 column"))
+    keys = dict(re.findall(r"(\w+) = ([\d.]+)", line))
+    assert set(keys) == {"K1", "K2", "u_K1K2"}
+    bemt.new("10x5", out=tmp_path / "case")
+    case = load_case(tmp_path / "case/case.toml")
+    fitted = case.replaced({f"model.{k}": float(v) for k, v in keys.items()} | {"model.u_K1K2": 0.07})
+    assert fitted.replaced({"model.K1": fit.THESIS.K1, "model.K2": fit.THESIS.K2}).file.model.K1 == case.file.model.K1
+    rpm = np.array([4000.0, 8000.0])
+    before, after = (k1k2_case(c, None, rpm, 0.0 * rpm, c.air()) for c in (case, fitted))
+    D, P = 10 * INCH, 5 * INCH
+    assert before.thrust_N == pytest.approx(k1k2.thrust(D, P, rpm, 0.0, case.air().rho))
+    exact = case.air().rho * np.pi / 4.0 * D**2 * (rpm / 60.0 * P) ** 2 * (0.35 * D / P) ** 1.3
+    assert after.thrust_N == pytest.approx(exact, rel=1e-3)
+    assert after.u_thrust_N == pytest.approx(0.07 * after.thrust_N)
+
+
+def test_the_u_of_a_refit_is_that_of_propellers_left_out():
+    points = noisy(4, 0.1)
+    found = calibrate.calibrate(points, None).k1k2["refit"].u
+    assert found == pytest.approx(np.sqrt(np.mean((fit.left_out(points) / points.CT - 1.0) ** 2)), rel=1e-9)
+    assert 0.05 < found < 0.2

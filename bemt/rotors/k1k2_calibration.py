@@ -12,6 +12,7 @@ Schema ``bemt.calibration/2``: ``k1k2``, ``scores`` (``calibration`` and ``test`
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +53,8 @@ class K1K2(Documented):
     # What they were fitted on
     points: int = 0
     propellers: int = 0
+    # Root mean square of made over measured less one, at rest, each propeller left out of its fit [-]
+    u: float = float("nan")
 
 
 THESIS = K1K2(empirical.K1, empirical.K2)
@@ -295,6 +298,10 @@ def calibrate(
     k1k2 = _k1k2(points, DRAWS, notes)
     CT = {key: CT_k1k2(points, c.K1, c.K2) for key, c in k1k2.items()}
     CT |= {key: left_out(points, key == "refit_flight") for key in ("refit", "refit_flight") if key in k1k2}
+    rest = usable(points)
+    w = weights(points.index[rest])
+    off = {key: np.average((CT[key][rest] / points.CT[rest] - 1.0) ** 2, weights=w) for key in CT if rest.any()}
+    k1k2 |= {key: replace(k1k2[key], u=float(np.sqrt(v))) for key, v in off.items()}
     tested = None if test is None else score(test, {key: CT_k1k2(test, c.K1, c.K2) for key, c in k1k2.items()})
     return Calibration(
         tuple(Path(f).name for f in given or ["uiuc"]), tuple(Path(f).name for f in held),
@@ -399,6 +406,13 @@ def text(doc: Calibration) -> str:
                      str(c.propellers or "-")])  # fmt: skip
     header = ["F = rho A (vp^2 - vp V) (K1 D/p)^K2", "K1", "95 % (bootstrap)", "K2", "95 %", "points", "propellers"]
     lines = [text_table(header, rows)]
+    best = next((doc.k1k2[k] for k in ("refit", "goal_seek") if k in doc.k1k2), THESIS)
+    if best.points:
+        u = f", u_K1K2 = {best.u:.3f}" if np.isfinite(best.u) else ""
+        lines += [
+            "",
+            f"For the K1/K2 column of a case, in [model], a line each: K1 = {best.K1:.4f}, K2 = {best.K2:.4f}{u}",
+        ]
     for name, found in doc.scores.items():
         lines += _set(name, found) if found is not None else []
     if doc.refused:
