@@ -330,7 +330,7 @@ class AirTable(Table):
 
 
 class ModelTable(Table):
-    """[model]: active effects, section tables, blade elements, K1/K2."""
+    """[model]: active effects, section tables, blade elements."""
 
     effects_on: tuple[str, ...] = entry("effects to switch on, as name or name(parameter=value)", default=())
     effects_off: tuple[str, ...] = entry("effects to switch off", default=())
@@ -340,9 +340,9 @@ class ModelTable(Table):
         "factor on the profile drag of the section rule", "", 0.3, 3, _percent("drag_level", 20.0), default=DRAG_LEVEL
     )
     stations: int = entry("number of blade elements", low=5, high=1000, default=40)
-    K1: float = entry("coefficient of D/p of the K1/K2 column, as calibrate fits it", "", 0.01, 10, default=k1k2.K1)
+    K1: float = entry("of the K1/K2 column", "", 0.01, 10, default=k1k2.K1)
     K2: float = entry("its exponent", "", 0.1, 5, default=k1k2.K2)
-    u_K1K2: float = entry("its standard deviation over the static thrust", "", 0, 5, default=k1k2.U_MEASURED)
+    u_K1K2: float = entry("its relative u", "", 0, 5, default=k1k2.U_MEASURED)
 
 
 class SweepTable(Table):
