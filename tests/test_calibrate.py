@@ -348,6 +348,8 @@ def test_it_reads_what_every_reader_reads(tmp_path: Path):
         bemt.calibrate(tmp_path / "one.csv")
     found = bemt.calibrate(tmp_path / "one.csv", label="8x4").to_dict()
     assert found["data"]["calibration"]["points"] == 4
+    one.assign(ducted=1).to_csv(tmp_path / "fan.csv", index=False)
+    assert gather.load([tmp_path / "fan.csv"], label="8x4").propellers[0].ducted
     made = gather.load([tmp_path / "one.csv"], label="8x4x3").propellers[0]
     assert (made.diameter_m, made.pitch_m, made.blades) == (pytest.approx(8 * INCH), pytest.approx(4 * INCH), 3)
 
@@ -376,3 +378,13 @@ def test_the_u_of_a_refit_is_that_of_propellers_left_out():
     found = calibrate.calibrate(points, None).k1k2["refit"].u
     assert found == pytest.approx(np.sqrt(np.mean((fit.left_out(points) / points.CT - 1.0) ** 2)), rel=1e-9)
     assert 0.05 < found < 0.2
+
+
+def test_a_table_whose_rows_have_no_size_is_refused(tmp_path: Path):
+    (tmp_path / "a.csv").write_text("diameter_in,pitch_in,rpm,thrust_N\n0,5,6000,5\n-10,5,7000,6\n")
+    with pytest.raises(InputError, match=r"no positive diameter, pitch and blade count \(lines 2, 3\)"):
+        bemt.calibrate(tmp_path / "a.csv")
+    frame = bench().astype(float)
+    frame.loc[:3, "rpm"], frame.loc[4:7, "thrust_N"] = 0.0, np.nan
+    doc = bemt.calibrate(frame).to_dict()
+    assert doc["k1k2"]["refit"]["propellers"] == 6 and len(doc["refused"]) == 2

@@ -166,7 +166,7 @@ def _sizes(found: Dataset, label: str | None) -> tuple[list[Any], tuple[str, ...
             of_rows = [(d.diameter_in * INCH, d.pitch_in * INCH, d.blades) if (d := labels.get(cell)) else (np.nan,) * 3
                        for cell in cells]  # fmt: skip
             of_label = [*np.array(of_rows, dtype=float).T, None]
-            sizes = [a if b is None or label else b for a, b in zip(of_label, sizes, strict=True)]
+            sizes = [a if a is not None and (label or b is None) else b for a, b in zip(of_label, sizes, strict=True)]
             names = names or tuple(cells)
             break
     return sizes, names or found.texts.get("propeller") or (Path(found.file or found.name).stem,) * N
@@ -201,13 +201,18 @@ def _from_table(file: str, found: Dataset, label: str | None = None) -> Gathered
     notes = [] if B is not None else [f"{file}: no column blades, 2 assumed"]
     B, duct = np.full(len(found), 2.0) if B is None else B, np.zeros(len(found)) if duct is None else duct
     sized = replace(found, values={**found.values, "diameter_m": D, "pitch_m": pitch}, lines=loaded.lines)
-    groups: dict[tuple[Any, ...], list[int]] = {}
+    groups: dict[tuple[str, float, float, float, bool], list[int]] = {}
+    bad: list[int] = []
     for i, key in enumerate(zip(names, D, pitch, B, duct > 0, strict=True)):
         known = all(np.isfinite(v) and v > 0 for v in key[1:4]) and key[3] == round(key[3])
-        groups.setdefault(key if known else (), []).append(i)
-    bad = [sized.lines[i] for i in groups.pop((), [])]
+        if known:
+            groups.setdefault(key, []).append(i)
+        else:
+            bad.append(sized.lines[i])
     refused = [f"{file}: no positive diameter, pitch and blade count (lines {some(bad)})"] if bad else []
-    checked = {key: _checked(sized.select(np.array(at)), *key[1:3], key[4]) for key, at in groups.items()}
+    if not groups:
+        return [], refused, notes
+    checked = {key: _checked(sized.select(np.array(at)), key[1], key[2], key[4]) for key, at in groups.items()}
     sound = [key for key, (_, wrong, _) in checked.items() if not wrong]
     # of few rows each, or all alike: together they say more
     rest = sized.select(np.sort(np.concatenate([groups[key] for key in sound or groups])))
@@ -226,9 +231,12 @@ def _from_table(file: str, found: Dataset, label: str | None = None) -> Gathered
             continue
         refused += [f"{file}: {name}: {words}" for words in dropped_words(reduction(points))]
         notes += [f"{file}: {name}: {words}" for words in doubtful]
-        if "CT" not in points:
+        if "CT" not in points and "thrust_N" in points:
             points = points.derive(d, RHO)
             notes.append(f"{file}: no density, {RHO:g} kg/m3 assumed")
+        if not {"rpm", "CT"} <= points.values.keys():
+            refused.append(f"{file}: {name}: no row with a speed and a thrust")
+            continue
         rows.append((made, points.rpm, points["J"] if "J" in points else np.zeros(len(points)), points["CT"]))
     return rows, refused, list(dict.fromkeys(notes))
 
