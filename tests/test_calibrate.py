@@ -348,6 +348,8 @@ def test_it_reads_what_every_reader_reads(tmp_path: Path):
         bemt.calibrate(tmp_path / "one.csv")
     found = bemt.calibrate(tmp_path / "one.csv", label="8x4").to_dict()
     assert found["data"]["calibration"]["points"] == 4
+    with pytest.raises(InputError, match="got unreadable text"):
+        bemt.calibrate(tmp_path / "one.csv", label="eight by four")
     one.assign(ducted=1).to_csv(tmp_path / "fan.csv", index=False)
     assert gather.load([tmp_path / "fan.csv"], label="8x4").propellers[0].ducted
     made = gather.load([tmp_path / "one.csv"], label="8x4x3").propellers[0]

@@ -163,6 +163,8 @@ def _sizes(found: Dataset, label: str | None) -> tuple[list[Any], tuple[str, ...
     for cells in ((label,) * N,) if label else found.texts.values():
         with suppress(InputError):
             labels = {cell: read_label(cell) for cell in {*cells} if cell.strip()}
+            if not labels:
+                continue
             of_rows = [(d.diameter_in * INCH, d.pitch_in * INCH, d.blades) if (d := labels.get(cell)) else (np.nan,) * 3
                        for cell in cells]  # fmt: skip
             of_label = [*np.array(of_rows, dtype=float).T, None]
@@ -354,6 +356,8 @@ def read(
     given: Sequence[str | Dataset], test: Sequence[str | Dataset] = (), label: str | None = None
 ) -> tuple[FitPoints, FitPoints | None]:
     """FitPoints to fit (of the data found when none are named) and held-out points; all faults of both at once."""
+    if label is not None:
+        read_label(label)
     if not given and find_data("uiuc") is None:
         hint = "Name files, or fetch a database: bemt lab fetch uiuc"
         raise InputError(Fault("FILES", "", "none, and no UIUC data found", "measured propellers", hint))
