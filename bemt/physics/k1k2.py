@@ -158,10 +158,9 @@ def validity_flags(d_over_p: float, M_tip: float = 0.0, J: float = 0.0, ducted: 
 
 def estimate(
     diameter_m: ArrayLike, pitch_m: ArrayLike, rpm: ArrayLike, V: ArrayLike = 0.0, air: Air | None = None,
-    hub_diameter_m: ArrayLike = 0.0, ducted: bool = False, K1: float = K1, K2: float = K2,
-    u_share: float = U_MEASURED,
+    hub_diameter_m: ArrayLike = 0.0, ducted: bool = False, K1: float = K1, K2: float = K2, share: float = U_MEASURED,
 ) -> Dataset:  # fmt: skip
-    """Thrust by the K1/K2 model with coefficients, uncertainty (a share of the static thrust) and flags.
+    """Thrust by the K1/K2 model with coefficients, uncertainty (`share` of the static thrust) and flags.
 
     >>> from bemt.base.units import KGF
     >>> e = estimate(14 * 0.0254, 8 * 0.0254, 20000.0)
@@ -178,7 +177,7 @@ def estimate(
     # without rotation J is NaN: the sign of V decides then
     J_flag = np.where(np.isnan(J), np.copysign(np.where(v == 0, 0.0, np.inf), v), J)
     flags = tuple(validity_flags(d, m, j, ducted) for d, m, j in zip(D / p, M, J_flag, strict=True))
-    u = np.where((v == 0) & (not ducted), u_share * F, np.nan)
+    u = np.where((v == 0) & (not ducted), share * F, np.nan)
     values = {"thrust_N": F, "rpm": w, "airspeed_m_s": v, "density_kg_m3": rho, "CT": co.CT(F, rho, n, D), "J": J,
               "M_tip": M}  # fmt: skip
     return Dataset("k1k2", "K1/K2", values, {"thrust_N": np.abs(u)}, flags)
