@@ -380,6 +380,9 @@ def test_the_u_of_a_refit_is_that_of_propellers_left_out():
     found = calibrate.calibrate(points, None).k1k2["refit"].u
     assert found == pytest.approx(np.sqrt(np.mean((fit.left_out(points) / points.CT - 1.0) ** 2)), rel=1e-9)
     assert 0.05 < found < 0.2
+    one = calibrate.calibrate(points.select(points.index == 0), None)  # its own scatter is no u of it
+    assert np.isnan(one.k1k2["goal_seek"].u) and "u_K1K2" not in calibrate.text(one)
+    assert f"K1 = {one.k1k2['goal_seek'].K1:.4f}" in calibrate.text(one)
 
 
 def test_a_table_whose_rows_have_no_size_is_refused(tmp_path: Path):

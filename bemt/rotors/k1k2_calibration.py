@@ -297,10 +297,11 @@ def calibrate(
     progress("K1 and K2")
     k1k2 = _k1k2(points, DRAWS, notes)
     CT = {key: CT_k1k2(points, c.K1, c.K2) for key, c in k1k2.items()}
-    CT |= {key: left_out(points, key == "refit_flight") for key in ("refit", "refit_flight") if key in k1k2}
+    apart = {key: left_out(points, key == "refit_flight") for key in ("refit", "refit_flight") if key in k1k2}
+    CT |= apart
     rest = usable(points)
     w = weights(points.index[rest])
-    off = {key: np.average((CT[key][rest] / points.CT[rest] - 1.0) ** 2, weights=w) for key in CT if rest.any()}
+    off = {key: np.average((c[rest] / points.CT[rest] - 1.0) ** 2, weights=w) for key, c in apart.items()}
     k1k2 |= {key: replace(k1k2[key], u=float(np.sqrt(v))) for key, v in off.items()}
     tested = None if test is None else score(test, {key: CT_k1k2(test, c.K1, c.K2) for key, c in k1k2.items()})
     return Calibration(
