@@ -321,22 +321,22 @@ to 10,000 rev/min; `dfdc` uses the fan `ds30`.
 {chr(10).join(kinds["loads"])}
 
 The errors are those of the model class, from static to zero thrust. Targets of one or three numbers err with speed,
-too: give `--rpm` near the speed you fly. A single constant (`gazebo`) is within {still:.0f} % at rest and off by the
-whole thrust in flight. Beyond the tables programs hold the last value.
+too: they are right at rest at `--rpm`. A single constant (`gazebo`) is within {still:.0f} % at rest and off by the
+whole thrust in flight.
 
 ### From rest, at the program's own step
 
-Five throttles (20 to 100 %) of every shipped case and of three labels, from rest, as a user starts the files. Greatest
-difference to the library, in per cent of the load at that throttle ([all rows](throttles.csv)). Gazebo, PX4 SIH and
-ArduPilot were not run: these are the formulas of their sources.
+Five throttles (20 to 100 %) of every shipped case and of three labels. Greatest difference to the library, in per cent
+of the load at that throttle ([all rows](throttles.csv)). Gazebo, PX4 SIH and ArduPilot were not run: these are the
+formulas of their sources.
 
 | target | thrust off, % | torque off, % | overshoot, % |
 |---|---|---|---|
 {_started_rows()}
 
 JSBSim's motor is that of the case's `[drive]`, without one as large as the rotor needs; where light blades would
-overshoot its explicit Euler, `ixx` is raised, and a note says so. Two scripts run the exported 10x5 without a
-controller: [hover.py](hover.py) (MuJoCo) and [zero_thrust.py](zero_thrust.py) (JSBSim).
+overshoot its explicit Euler, `ixx` is raised. [hover.py](hover.py) (MuJoCo) and [zero_thrust.py](zero_thrust.py)
+(JSBSim) run the exported 10x5 without a controller.
 
 ## Loads across the shaft
 

@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
+import bemt
 from bemt.app import cli
 from bemt.base.errors import InputError
+from bemt.data.recordings.check import check
+from bemt.data.recordings.load import import_file
+from bemt.physics import k1k2
 from bemt.rotors import k1k2_calibration as calibrate
 from bemt.rotors import k1k2_calibration as fit
 from bemt.rotors import k1k2_points as gather
+from bemt.rotors.case import load_case
+from bemt.rotors.case.prepare import k1k2_case
 from bemt.rotors.k1k2_points import FitPoints, MeasuredPropeller
 
 INCH = 0.0254
@@ -263,3 +271,125 @@ def test_a_file_is_fitted_once_and_never_held_out_too(tmp_path, capsys):
             and not said.out
             and not out.exists()
         )
+
+
+def bench(K1=0.31, K2=1.4) -> pd.DataFrame:
+    """A stand's table of eight propellers that follow K1/K2 exactly."""
+    rows = []
+    for d, p in SIZES[:8]:
+        D, pitch = d * INCH, p * INCH
+        T = np.pi / 4.0 * 1.2 * (RPM / 60.0) ** 2 * D**2 * pitch**2 * (K1 * d / p) ** K2
+        rows += [(d, p, n, t, 1.2) for n, t in zip(RPM, T, strict=True)]
+    return pd.DataFrame(rows, columns=["diameter_in", "pitch_in", "rpm", "thrust_N", "density_kg_m3"])
+
+
+@pytest.mark.parametrize(
+    ("column", "factor", "words"),
+    [
+        ("diameter_in", 25.4, "mm taken for in: multiply by 0.0393701"),
+        ("thrust_N", 1000.0 / 9.80665, "gf taken for N: multiply by 0.00980665"),
+        ("rpm", 7.0, "electrical revolutions over"),
+    ],
+)
+def test_a_slip_of_units_is_named_and_not_fitted(tmp_path: Path, column: str, factor: float, words: str):
+    frame = bench()
+    frame[column] = frame[column] * factor
+    frame.to_csv(tmp_path / "a.csv", index=False)
+    for rows in (frame, tmp_path / "a.csv", frame[::4]):  # one row of each propeller too
+        with pytest.raises(InputError, match=words):
+            bemt.calibrate(rows)
+    assert any(words in f.correction for f in check(import_file(tmp_path / "a.csv")))  # `import` says it as well
+    one = bench().astype(float)
+    at = one.diameter_in == 8
+    one.loc[at, column] = one.loc[at, column] * factor
+    found = bemt.calibrate(one).to_dict()
+    assert any(words in line for line in found["refused"])
+    assert found["k1k2"]["refit"]["propellers"] == 6 and found["k1k2"]["refit"]["K1"] == pytest.approx(0.31, abs=1e-9)
+
+
+def test_every_row_that_is_left_out_is_named(tmp_path: Path):
+    frame = bench()
+    frame["rpm"] = frame["rpm"].astype(float)
+    frame.loc[1, "thrust_N"], frame.loc[6, "rpm"], frame.loc[9, "thrust_N"] = np.nan, 0.0, -3.0
+    frame.to_csv(tmp_path / "a.csv", index=False)
+    told = bemt.calibrate(tmp_path / "a.csv")
+    doc, page = told.to_dict(), told.text
+    assert doc["k1k2"]["refit"]["points"] == len(frame) - 3
+    for line, reason in ((3, "no load"), (8, "reads 0 while the rotor turns"), (11, "lowest -3 N")):
+        rows = [words for words in (*doc["refused"], *doc["notes"]) if reason in words and str(line) in words]
+        assert rows and all(words in page for words in rows), (line, reason)
+
+
+def test_reversed_thrust_is_said():
+    points = planted()
+    down = replace(points, CT=np.where(points.index == 3, -points.CT, points.CT))
+    assert "4 points without forward thrust: neither fitted nor scored" in calibrate.calibrate(down, None).notes
+
+
+def test_it_reads_what_every_reader_reads(tmp_path: Path):
+    frame = bench()
+    truth = bemt.calibrate(frame).to_dict()["k1k2"]
+    assert truth["refit"]["K1"] == pytest.approx(0.31, abs=1e-9)
+    labels = [f"{d:g}x{p:g}" for d, p in zip(frame.diameter_in, frame.pitch_in, strict=True)]
+    rest = frame.drop(columns=["diameter_in", "pitch_in"])
+    doors = {
+        "label.csv": rest.assign(Propeller=labels),
+        "omega.csv": frame.assign(omega_rad_s=frame.rpm * np.pi / 30).drop(columns="rpm"),
+        "grams.csv": frame.assign(Thrust_g=frame.thrust_N / 9.80665e-3).drop(columns="thrust_N"),
+    }
+    for name, table in doors.items():
+        table.to_csv(tmp_path / name, index=False)
+        for given in (tmp_path / name, table) if name != "grams.csv" else (tmp_path / name,):
+            found = bemt.calibrate(given).to_dict()["k1k2"]["refit"]
+            assert (found["K1"], found["K2"]) == pytest.approx((0.31, 1.4), abs=1e-9), name
+    one = rest[:4]
+    one.to_csv(tmp_path / "one.csv", index=False)
+    with pytest.raises(InputError, match=r"no column diameter.*label=10x4.5"):
+        bemt.calibrate(tmp_path / "one.csv")
+    found = bemt.calibrate(tmp_path / "one.csv", label="8x4").to_dict()
+    assert found["data"]["calibration"]["points"] == 4
+    with pytest.raises(InputError, match="got unreadable text"):
+        bemt.calibrate(tmp_path / "one.csv", label="eight by four")
+    one.assign(ducted=1).to_csv(tmp_path / "fan.csv", index=False)
+    assert gather.load([tmp_path / "fan.csv"], label="8x4").propellers[0].ducted
+    made = gather.load([tmp_path / "one.csv"], label="8x4x3").propellers[0]
+    assert (made.diameter_m, made.pitch_m, made.blades) == (pytest.approx(8 * INCH), pytest.approx(4 * INCH), 3)
+
+
+def test_fitted_constants_go_into_a_case(tmp_path: Path):
+    """What the page prints for `[model]` is what the K1/K2 column of the case then uses, with its u."""
+    told = bemt.calibrate(bench(0.35, 1.3))
+    (line,) = (line for line in told.text.splitlines() if line.startswith("For the K1/K2 column"))
+    keys = dict(re.findall(r"(\w+) = ([\d.]+)", line))
+    assert set(keys) == {"K1", "K2", "u_K1K2"}
+    bemt.new("10x5", out=tmp_path / "case")
+    case = load_case(tmp_path / "case/case.toml")
+    fitted = case.replaced({f"model.{k}": float(v) for k, v in keys.items()} | {"model.u_K1K2": 0.07})
+    assert fitted.replaced({"model.K1": fit.THESIS.K1, "model.K2": fit.THESIS.K2}).file.model.K1 == case.file.model.K1
+    rpm = np.array([4000.0, 8000.0])
+    before, after = (k1k2_case(c, None, rpm, 0.0 * rpm, c.air()) for c in (case, fitted))
+    D, P = 10 * INCH, 5 * INCH
+    assert before.thrust_N == pytest.approx(k1k2.thrust(D, P, rpm, 0.0, case.air().rho))
+    exact = case.air().rho * np.pi / 4.0 * D**2 * (rpm / 60.0 * P) ** 2 * (0.35 * D / P) ** 1.3
+    assert after.thrust_N == pytest.approx(exact, rel=1e-3)
+    assert after.u_thrust_N == pytest.approx(0.07 * after.thrust_N)
+
+
+def test_the_u_of_a_refit_is_that_of_propellers_left_out():
+    points = noisy(4, 0.1)
+    found = calibrate.calibrate(points, None).k1k2["refit"].u
+    assert found == pytest.approx(np.sqrt(np.mean((fit.left_out(points) / points.CT - 1.0) ** 2)), rel=1e-9)
+    assert 0.05 < found < 0.2
+    one = calibrate.calibrate(points.select(points.index == 0), None)  # its own scatter is no u of it
+    assert np.isnan(one.k1k2["goal_seek"].u) and "u_K1K2" not in calibrate.text(one)
+    assert f"K1 = {one.k1k2['goal_seek'].K1:.4f}" in calibrate.text(one)
+
+
+def test_a_table_whose_rows_have_no_size_is_refused(tmp_path: Path):
+    (tmp_path / "a.csv").write_text("diameter_in,pitch_in,rpm,thrust_N\n0,5,6000,5\n-10,5,7000,6\n")
+    with pytest.raises(InputError, match=r"no positive diameter, pitch and blade count \(lines 2, 3\)"):
+        bemt.calibrate(tmp_path / "a.csv")
+    frame = bench().astype(float)
+    frame.loc[:3, "rpm"], frame.loc[4:7, "thrust_N"] = 0.0, np.nan
+    doc = bemt.calibrate(frame).to_dict()
+    assert doc["k1k2"]["refit"]["propellers"] == 6 and len(doc["refused"]) == 2

@@ -193,6 +193,21 @@ def test_headings_of_a_table_are_converted_by_their_unit_and_all_faults_are_said
     assert {fault.where for fault in error.value.faults} == {"thrust", "torque_Nm"}
 
 
+def test_a_channel_that_is_not_there_is_named_with_the_nearest() -> None:
+    d = Dataset("bemt", "p", {"rpm": [4000.0], "thrust_N": [2.1]})
+    with pytest.raises(AttributeError, match="did you mean thrust_N"):
+        d.thrust  # noqa: B018
+    with pytest.raises(KeyError, match="did you mean thrust_N"):
+        d["thrust"]
+
+
+def test_columns_of_text_in_a_frame_stay_text() -> None:
+    d = from_pandas(pd.DataFrame({"rpm": [6000, 7000], "Propeller": ["10x5", "9x6"]}))
+    assert d.texts == {"Propeller": ("10x5", "9x6")} and list(d) == ["rpm"]
+    with pytest.raises(InputError):
+        from_pandas(pd.DataFrame({"rpm": [6000, 7000], "thrust": ["10", 6.0]}))
+
+
 def test_it_iterates_over_the_names_that_in_and_brackets_take() -> None:
     d = Dataset("bemt", "p", {"rpm": [4000.0, 6000.0], "thrust_N": [2.1, 4.7]})
     assert list(d) == ["rpm", "thrust_N"] and all(name in d and len(d[name]) == len(d) for name in d)

@@ -1110,3 +1110,21 @@ def test_the_hand_of_a_simulator_s_motor_is_an_option(tmp_path: Path, project: P
     assert text == next(other).read_text() and "<turningDirection>cw</turningDirection>" in text
     with pytest.raises(InputError, match="printable"):
         bemt.export(str(case), tmp_path / "both", "gazebo", hand="both")
+
+
+@pytest.mark.parametrize("word", ["gazebo", "rotorpy", "px4", "ardupilot"])
+def test_a_stated_speed_is_where_a_model_of_few_numbers_is_right(word, project, tmp_path):
+    """It has the static loads of BEMT there; the range stays that of the case, and the manifest tells its errors."""
+    case = load_case(project / "cases/prop_10x5/case.toml")
+    at, target = 0.6 * case.rpm, exports()[word]
+    made = bemt.export(project / "cases/prop_10x5", tmp_path, word, rpm=at)
+    files = {file.name: file.read_text() for file in made.files if file.parent.name == word}
+    truth = solve_points(case, at, 0.0)
+    for got, exact in zip(
+        target.loads(files, np.array([at]), np.zeros(1)), (truth.thrust_N, truth.torque_Nm), strict=True
+    ):
+        assert np.isnan(got).all() or got == pytest.approx(exact, rel=2e-5)
+    (told,) = json.loads((tmp_path / "manifest.json").read_text())["targets"]
+    assert told["range"]["rpm"][1] == pytest.approx(Job(case).rpm_full)
+    assert told["fit_error_pct"]["thrust"]["at_rest"] > 1.0
+    assert any(f"matched at rest at {at:.6g} rev/min" in note for note in told["notes"])

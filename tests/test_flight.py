@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from flight_files import broken_copies
 
+import bemt
 from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.rotors.case import load_case
@@ -625,3 +626,22 @@ def test_the_bar_of_a_motor_and_the_stated_size_are_one_number(healthy: int) -> 
     assert bars[2] == pytest.approx(0.25, abs=0.005) and np.sum(bars) == pytest.approx(0.0, abs=1e-9)
     if (stated := stated_size(j)) is not None:
         assert abs(bars[2] - stated.size) < stated.half
+
+
+def test_a_thrust_that_no_such_propeller_has_is_asked_about(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Speeds counted twice are a question of pole pairs and of the propeller, in the text and as the next step."""
+    t, noise = np.arange(0.0, 20.0, 0.01), np.random.default_rng(5)
+    weight = 4.0 * float(bemt.propeller("10x4.5").solve(rpm=5000.0).thrust_N[0]) / 9.80665
+    for factor, asked in ((2.0, True), (1.0, False)):
+        rpm = 5000.0 * factor * (1.0 + 0.003 * noise.standard_normal((t.size, 4)))
+        file = tmp_path / f"{factor:g}.csv"
+        rows = np.column_stack([t, rpm])
+        np.savetxt(file, rows, delimiter=",", header="t_s,rpm1,rpm2,rpm3,rpm4", comments="", fmt="%.6g")
+        assert main(["fly", str(file), "--mass-kg", f"{weight:.4g}", "--case", "10x4.5"]) == 0
+        said = capsys.readouterr().out
+        step = next(line for line in said.splitlines() if line.startswith("Next: "))
+        assert ("Is it this rotor?" in step) == asked == ("pole pairs" in said)
+        found = bemt.fly(file, mass_kg=weight, case="10x4.5").flights[0]
+        ratio, _ = found.over_case
+        assert ratio == pytest.approx(factor**-2, rel=0.1)  # CT grows with the Reynolds number
+        assert not asked or f"{ratio**0.5:.2f} times the logged speeds" in found.other_rotor

@@ -296,3 +296,36 @@ def test_a_vehicle_that_says_it_never_left_the_ground_has_no_constants(landed: b
 def test_a_state_holds_until_the_next_message() -> None:
     t, v = held((np.array([0.0, 60.0, 200.0]), np.array([0.0, 1.0, 0.0])))  # type: ignore[misc]
     assert np.interp([59.9, 60.1, 199.9, 200.1, 300.0], t, v).tolist() == [0.0, 1.0, 1.0, 0.0, 0.0]
+
+
+def test_a_cut_ulog_says_so_beside_what_it_lacks(tmp_path: Path) -> None:
+    """Wherever it is cut: in the log, in the verdict and as the next step; a whole one says nothing."""
+    file, whole = tmp_path / "a.ulg", ulog(Hover("quad-x", seconds=12.0))
+    file.write_bytes(whole)
+    assert read_log(file).ends == ""
+    for share in (0.9, 0.5):
+        file.write_bytes(whole[: int(share * len(whole)) | 1])
+        assert read_log(file).ends.startswith(("ends within a message", "damaged"))
+    short = next(n for n in range(len(whole) // 40, len(whole)) if (log := _log_of(file, whole[:n])) and log.ends)
+    assert 0 < read_log(file).flying.sum() < 50, short
+    said = answer_on(read_log(file)).judged
+    assert "in the air are too few" in said.said.why and "ends within a message" in said.said.why
+    assert "no flight" not in text(answer_on(read_log(file))) and said.next.text.startswith("download the log again")
+
+
+def _log_of(file: Path, data: bytes) -> FlightLog | None:
+    """A log of the first bytes of a file; None where they hold too little."""
+    file.write_bytes(data)
+    try:
+        found = read_log(file)
+    except InputError:
+        return None
+    return found if found.flying.any() else None
+
+
+@pytest.mark.parametrize(("name", "kind"), [("junk.ulg", "PX4 ULog"), ("junk.bin", "DataFlash")])
+def test_a_file_that_is_not_what_its_name_says(name: str, kind: str, tmp_path: Path) -> None:
+    """The error speaks of the format of the name, not of the headings of a table."""
+    (tmp_path / name).write_bytes(b"not a log")
+    with pytest.raises(InputError, match=f"first bytes that no .*{kind}"):
+        read_log(tmp_path / name)

@@ -74,7 +74,10 @@ def test_faults_are_those_of_the_arguments_of_the_call(call: Callable[[], object
         assert not FOREIGN.search(f"{fault.file} {fault.where} {fault.expected} {fault.hint}")
 
 
-@pytest.mark.parametrize("value", ["6000", ["6000"], True, [5000, "6000"], {"rpm": 6000}, np.array(["6000"])])
+@pytest.mark.parametrize(
+    "value", ["6000", ["6000"], True, [5000, "6000"], {"rpm": 6000}, np.array(["6000"]), 6000 + 1j, [5000, 6000 + 1j]]
+)
+@pytest.mark.filterwarnings("error")
 def test_a_text_is_no_number(value: object) -> None:
     for call in (bemt.propeller(PAIR).solve, lambda v: bemt.estimate(PAIR, v)):
         with pytest.raises(bemt.InputError, match=r"^rpm: got \w+ .*; expected a number"):
@@ -124,6 +127,7 @@ def test_a_curve_is_every_speed_with_every_advance_ratio() -> None:
         (lambda: bemt.propeller(stations="absent.csv"), "diameter_m"),
         (lambda: bemt.propeller(stations="x.csv", diameter_m=254.0), "Divide by 1000"),
         (lambda: bemt.propeller("10x5").solve(-6000), "Drop the sign"),
+        (lambda: bemt.propeller("10x5", reading={"rpm": 5400, "thrust_g": 4100}), "expected loads of this rotor"),
         (lambda: bemt.propeller("10x5").solve(6000, 3.0, J=0.2), "one of them"),
         (lambda: bemt.propeller("10x5").solve(float("nan")), "finite"),
         (lambda: bemt.load("no/such/case"), "no/such/case"),

@@ -20,13 +20,12 @@ def numbers(name: str, value: Any, finite: bool = True) -> Array:
     wrong = Fault("", name, f"{type(value).__name__} {value!r:.60}", "a number, or several")
     try:
         raw = np.asarray(value)
-        text = raw.dtype.kind in "USTbM"
-        text |= raw.dtype.kind == "O" and any(isinstance(v, (str, bytes, bool)) for v in raw.flat)
+        kind, words = raw.dtype.kind, (str, bytes, bool)
+        if kind in "USTbMc" or (kind == "O" and any(isinstance(v, words) for v in raw.flat)):
+            raise TypeError  # numpy would read "6000" and True as numbers, and 6000+1j as 6000
         found = np.asarray(raw, dtype=float)
     except (TypeError, ValueError):
         raise InputError(wrong) from None
-    if text:  # numpy would read "6000" and True as numbers
-        raise InputError(wrong)
     if not found.size:
         raise InputError(Fault("", name, "no number", "one or more"))
     if finite and not np.all(np.isfinite(found)):

@@ -55,7 +55,7 @@ FLIGHT_RATIO = ((0.1, 0.3, 0.5, 0.7, 0.9), (0.86, 0.77, 0.64, 0.53, 0.31))
 nominal D and p; `reports/studies/reproduce.py` recomputes it where the data are."""
 
 
-def corrected_equation(rho: Any, area: Any, v_pitch: Any, V: Any, d_over_p: Any) -> Any:
+def corrected_equation(rho: Any, area: Any, v_pitch: Any, V: Any, d_over_p: Any, K1: float = K1, K2: float = K2) -> Any:
     """K1/K2 equation in its right form, every term inside the bracket. [N]
 
     >>> round(corrected_equation(1.225, 1.0, 10.0, 5.0, 3.29546), 3)
@@ -106,9 +106,9 @@ def zero_thrust_J(diameter_m: ArrayLike, pitch_m: ArrayLike) -> Any:
 
 def thrust(
     diameter_m: ArrayLike, pitch_m: ArrayLike, rpm: ArrayLike, V: ArrayLike = 0.0, rho: ArrayLike = RHO_FIXED,
-    hub_diameter_m: ArrayLike = 0.0,
+    hub_diameter_m: ArrayLike = 0.0, K1: float = K1, K2: float = K2,
 ) -> Any:  # fmt: skip
-    """Thrust by the K1/K2 model. [N]
+    """Thrust by the K1/K2 model, with fitted constants if they are given. [N]
 
     Reference [1] of the module, final equation of part 1.  Its worked example: 10x6 at 10 500 rev/min, 1619 gf.
 
@@ -119,7 +119,7 @@ def thrust(
     """
     D, p, w, v, r, h = (np.asarray(x, dtype=float) for x in (diameter_m, pitch_m, rpm, V, rho, hub_diameter_m))
     _check(D, p, w, v, r, h)
-    F = corrected_equation(r, np.pi / 4.0 * (D**2 - h**2), w / 60.0 * p, v, D / p)
+    F = corrected_equation(r, np.pi / 4.0 * (D**2 - h**2), w / 60.0 * p, v, D / p, K1, K2)
     return float(F) if np.ndim(F) == 0 else F
 
 
@@ -158,9 +158,9 @@ def validity_flags(d_over_p: float, M_tip: float = 0.0, J: float = 0.0, ducted: 
 
 def estimate(
     diameter_m: ArrayLike, pitch_m: ArrayLike, rpm: ArrayLike, V: ArrayLike = 0.0, air: Air | None = None,
-    hub_diameter_m: ArrayLike = 0.0, ducted: bool = False,
+    hub_diameter_m: ArrayLike = 0.0, ducted: bool = False, K1: float = K1, K2: float = K2, share: float = U_MEASURED,
 ) -> Dataset:  # fmt: skip
-    """Thrust by the K1/K2 model with coefficients, uncertainty and flags.
+    """Thrust by the K1/K2 model with coefficients, uncertainty (`share` of the static thrust) and flags.
 
     >>> from bemt.base.units import KGF
     >>> e = estimate(14 * 0.0254, 8 * 0.0254, 20000.0)
@@ -170,14 +170,14 @@ def estimate(
     air = Air.from_density() if air is None else air
     names = (diameter_m, pitch_m, rpm, V, air.rho, air.a_sound, hub_diameter_m)
     D, p, w, v, rho, a, h = (np.ravel(x) for x in np.broadcast_arrays(*(np.asarray(x, float) for x in names)))
-    F = np.asarray(thrust(D, p, w, v, rho, h), dtype=float)
+    F = np.asarray(thrust(D, p, w, v, rho, h, K1, K2), dtype=float)
     n = w / 60.0
     J = np.asarray(co.J(v, n, D))
     M = np.asarray(co.M_tip(n, D, a))
     # without rotation J is NaN: the sign of V decides then
     J_flag = np.where(np.isnan(J), np.copysign(np.where(v == 0, 0.0, np.inf), v), J)
     flags = tuple(validity_flags(d, m, j, ducted) for d, m, j in zip(D / p, M, J_flag, strict=True))
-    u = np.where((v == 0) & (not ducted), U_MEASURED * F, np.nan)
+    u = np.where((v == 0) & (not ducted), share * F, np.nan)
     values = {"thrust_N": F, "rpm": w, "airspeed_m_s": v, "density_kg_m3": rho, "CT": co.CT(F, rho, n, D), "J": J,
               "M_tip": M}  # fmt: skip
     return Dataset("k1k2", "K1/K2", values, {"thrust_N": np.abs(u)}, flags)

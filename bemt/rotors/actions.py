@@ -347,17 +347,20 @@ def validate(
 @action("Models and checks", "calibrate uiuc --out calibration", words=("files",))
 def calibrate(
     files: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = (), *,
-    test: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = (),
+    test: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = (), label: str | None = None,
     out: str | os.PathLike[str] | None = None, progress: Callable[[str], None] | None = None,
 ) -> Told:  # fmt: skip
     """Refit K1/K2 on measured propellers, with intervals and scores.
 
     Parameters
     ----------
-    files : path or sequence of paths
-        Files or folders with diameter, pitch, rpm and thrust or CT; ``uiuc``, the installed data, by default.
-    test : path or sequence of paths
+    files : path, Dataset, DataFrame, or sequence of them
+        Recordings and folders with speed, thrust or CT, diameter and pitch; ``uiuc``, the installed data, by default.
+        A column of labels (10x4.5) states a size as well.
+    test : path, Dataset, DataFrame, or sequence of them
         Held-out data: scored, never fitted.
+    label : str, optional
+        Propeller of files that do not state it: 10x4.5, or 10x4.5x3 with three blades.
     out : str or path, optional
         Folder for tables and JSON.
     progress : callable, optional
@@ -382,13 +385,13 @@ def calibrate(
     """
     import os
 
-    from bemt.base.given import paths_text
     from bemt.rotors import k1k2_calibration as k1k2
-    from bemt.rotors.k1k2_points import read
+    from bemt.rotors.k1k2_points import given, read
 
-    fitted, held = paths_text("files", files), paths_text("test", test)
-    points, scored = read(fitted, held)
-    found = k1k2.calibrate(points, scored, fitted, held, progress or (lambda line: None))
+    fitted, held = given("files", files), given("test", test)
+    points, scored = read(fitted, held, label)
+    of_fit, of_test = ([one if isinstance(one, str) else one.name for one in some] for some in (fitted, held))
+    found = k1k2.calibrate(points, scored, of_fit, of_test, progress or (lambda line: None))
     if out is not None:
         k1k2.write(found, os.fspath(out))
     return Told(found.document(), k1k2.text(found))

@@ -12,6 +12,7 @@ Schema ``bemt.calibration/2``: ``k1k2``, ``scores`` (``calibration`` and ``test`
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.base.document import Documented
 from bemt.base.errors import Fault, InputError
-from bemt.base.tables import json_text, text_table, write_atomic
+from bemt.base.tables import json_text, number_of, text_table, write_atomic
 from bemt.base.units import INCH
 from bemt.physics import k1k2 as empirical
 from bemt.rotors.k1k2_points import FitPoints
@@ -52,6 +53,8 @@ class K1K2(Documented):
     # What they were fitted on
     points: int = 0
     propellers: int = 0
+    # Root mean square of made over measured less one, at rest, each propeller left out of its fit [-]
+    u: float = float("nan")
 
 
 THESIS = K1K2(empirical.K1, empirical.K2)
@@ -289,10 +292,17 @@ def calibrate(
 ) -> Calibration:  # fmt: skip
     """Fit, leave out, score; the names of the files stand in the document."""
     notes = [*points.notes, *(test.notes if test else ())]
+    down = int(sum(np.sum(p.CT <= 0.0) for p in (points, test) if p))
+    notes += [f"{number_of(down, 'point')} without forward thrust: neither fitted nor scored"] if down else []
     progress("K1 and K2")
     k1k2 = _k1k2(points, DRAWS, notes)
     CT = {key: CT_k1k2(points, c.K1, c.K2) for key, c in k1k2.items()}
-    CT |= {key: left_out(points, key == "refit_flight") for key in ("refit", "refit_flight") if key in k1k2}
+    apart = {key: left_out(points, key == "refit_flight") for key in ("refit", "refit_flight") if key in k1k2}
+    CT |= apart
+    rest = usable(points)
+    w = weights(points.index[rest])
+    off = {key: np.average((c[rest] / points.CT[rest] - 1.0) ** 2, weights=w) for key, c in apart.items()}
+    k1k2 |= {key: replace(k1k2[key], u=float(np.sqrt(v))) for key, v in off.items()}
     tested = None if test is None else score(test, {key: CT_k1k2(test, c.K1, c.K2) for key, c in k1k2.items()})
     return Calibration(
         tuple(Path(f).name for f in given or ["uiuc"]), tuple(Path(f).name for f in held),
@@ -397,6 +407,13 @@ def text(doc: Calibration) -> str:
                      str(c.propellers or "-")])  # fmt: skip
     header = ["F = rho A (vp^2 - vp V) (K1 D/p)^K2", "K1", "95 % (bootstrap)", "K2", "95 %", "points", "propellers"]
     lines = [text_table(header, rows)]
+    best = next((doc.k1k2[k] for k in ("refit", "goal_seek") if k in doc.k1k2), THESIS)
+    if best.points:
+        u = f", u_K1K2 = {best.u:.3f}" if np.isfinite(best.u) else ""
+        lines += [
+            "",
+            f"For the K1/K2 column of a case, in [model], a line each: K1 = {best.K1:.4f}, K2 = {best.K2:.4f}{u}",
+        ]
     for name, found in doc.scores.items():
         lines += _set(name, found) if found is not None else []
     if doc.refused:

@@ -1,13 +1,16 @@
 """Measured points gathered for a calibration: diameter, pitch, speed and thrust.
 
-UIUC folders and files, and any table with the columns (or ``recording.toml`` constants) diameter, pitch, rpm and thrust
-or CT; further columns are airspeed or J, density, blades, ducted (0 or 1), name.
+UIUC folders and files, and every recording that another command reads, as steady points: a speed of rotation, thrust
+or CT, and diameter and pitch as columns, constants of a ``recording.toml``, or labels in a column of text (10x4.5);
+further columns are airspeed or J, density or the state of the air, blades, ducted (0 or 1), name.
 """
 
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,15 +20,22 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, gathered, refuse
-from bemt.base.given import find_data
+from bemt.base.given import find_data, path_text
 from bemt.base.tables import number_of
 from bemt.base.units import INCH
 from bemt.data import readers as importers
 from bemt.data.readers import uiuc
+from bemt.data.readers.split import some
 from bemt.data.readers.uiuc_names import parse_file_name
+from bemt.data.recordings.channels import file_name, in_one_step, named
+from bemt.data.recordings.check import check, left_out
+from bemt.data.recordings.reduce import reduce, reduction
+from bemt.data.recordings.shown import dropped_words
 from bemt.physics import coefficients as co
 from bemt.physics.air import Air
 from bemt.physics.dataset import Dataset
+from bemt.physics.dataset.make import from_pandas
+from bemt.rotors.case.fresh import read_label
 
 RHO = 1.225
 """Density where a source states none [kg/m3]; coefficients do not depend on it."""
@@ -98,18 +108,20 @@ def join(rows: Sequence[Rows], refused: Sequence[str] = (), notes: Sequence[str]
     numbers: dict[str, int] = {}
     unique: list[MeasuredPropeller] = []
     parts: list[tuple[Array, ...]] = []
+    gone = [*refused]
     for made, *arrays in rows:
         k = numbers.setdefault(repr(made), len(unique))
         if k == len(unique):
             unique.append(made)
         rpm, J, CT = (np.asarray(a, dtype=float) for a in arrays)
         ok = np.isfinite(rpm) & (rpm > 0) & np.isfinite(J) & np.isfinite(CT)
+        gone += [f"{made.name}: {number_of(int(lost), 'point')} without rpm, J or CT"] if (lost := np.sum(~ok)) else []
         parts.append((np.full(int(ok.sum()), k), rpm[ok], J[ok], CT[ok]))
     joined = [np.concatenate(column) for column in zip(*parts, strict=True)] if parts else [np.empty(0)] * 4
     if joined[0].size == 0:
         raise InputError(Fault("", "", "no finite point", "rows with rpm, J and CT"))
     rpm, J, CT = joined[1:]
-    return FitPoints(tuple(unique), joined[0].astype(np.intp), rpm, J, CT, tuple(refused), tuple(notes))
+    return FitPoints(tuple(unique), joined[0].astype(np.intp), rpm, J, CT, tuple(gone), tuple(notes))
 
 
 def _from_uiuc(p: uiuc.UiucPropeller) -> tuple[list[Rows], list[str]]:
@@ -135,73 +147,103 @@ def _from_uiuc_table(path: Path, table: Any) -> tuple[list[Rows], list[str]]:
     return [], [f"{path}: geometry only"]
 
 
-def _groups(
-    names: Sequence[str], D: Array, pitch: Array, B: Array, duct: Array
-) -> tuple[dict[tuple[Any, ...], list[int]], int]:
-    """Rows of each propeller, by name, diameter, pitch, blades and whether it is in a duct; how many rows have none."""
-    groups: dict[tuple[Any, ...], list[int]] = {}
-    bad = 0
-    for i, name in enumerate(names):
-        values = (D[i], pitch[i], B[i])
-        if not (all(np.isfinite(v) and v > 0 for v in values) and B[i] == round(B[i])):
-            bad += 1
-            continue
-        key = (name, *values, bool(duct[i] > 0))
-        groups.setdefault(key, []).append(i)
-    return groups, bad
+Gathered = tuple[list[Rows], list[str], list[str]]
+"""Rows of propellers, what was left out, notes."""
 
 
-def _from_table(path: Path, found: Dataset) -> tuple[list[Rows], list[str], list[str]]:
-    """Any table with the columns of the module notes."""
-    N, constants = len(found), found.constants
+def _sizes(found: Dataset, label: str | None) -> tuple[list[Any], tuple[str, ...]]:
+    """Diameter and pitch [m], blades and duct of every row, (N,), None where nothing tells it; names of propellers."""
+    N, told, names = len(found), found.constants, found.texts.get("name")
 
-    def column(*names: str) -> Array | None:
-        for name in names:
-            if name in found:
-                return found[name]
-            if name in constants:
-                return np.full(N, float(constants[name]))
-        return None
+    def column(*channels: str) -> Array | None:
+        known = next((k for k in channels if k in found or k in told), None)
+        return None if known is None else found[known] if known in found else np.full(N, float(told[known]))
 
-    D, pitch, rpm = column("diameter_m", "D_m"), column("pitch_m"), column("rpm")
-    T, CT = column("thrust_N", "T_N"), column("CT")
-    missing = [name for name, values in (("diameter (with its unit)", D), ("pitch (with its unit)", pitch),
-               ("rpm", rpm), ("thrust (with its unit) or CT", T if CT is None else CT)) if values is None]  # fmt: skip
-    if missing or D is None or pitch is None or rpm is None:
-        return [], [f"{path}: no column {', '.join(missing)}"], []
-    notes = []
-    n = rpm / 60.0
-    rho = column("density_kg_m3", "rho_kg_m3")
-    if rho is None:
-        rho = np.full(N, RHO)
-        if CT is None:
-            notes.append(f"{path}: no density, {RHO:g} kg/m3 assumed")
-    if CT is None:
-        assert T is not None
-        CT = np.asarray(co.CT(T, rho, n, D))
-    J, V = column("J"), column("airspeed_m_s", "V_m_s")
-    if J is None:
-        J = np.zeros(N) if V is None else np.asarray(co.J(V, n, D))
-    B, duct = column("blades", "B"), column("ducted")
-    if B is None:
-        B = np.full(N, 2.0)
-        notes.append(f"{path}: no column blades, 2 assumed")
-    duct = np.zeros(N) if duct is None else duct
-    names = found.texts.get("name") or found.texts.get("propeller") or (path.stem,) * N
-    groups, bad = _groups(names, D, pitch, B, duct)
+    sizes = [column("diameter_m", "D_m"), column("pitch_m"), column("blades", "B"), column("ducted")]
+    for cells in ((label,) * N,) if label else found.texts.values():
+        with suppress(InputError):
+            labels = {cell: read_label(cell) for cell in {*cells} if cell.strip()}
+            if not labels:
+                continue
+            of_rows = [(d.diameter_in * INCH, d.pitch_in * INCH, d.blades) if (d := labels.get(cell)) else (np.nan,) * 3
+                       for cell in cells]  # fmt: skip
+            of_label = [*np.array(of_rows, dtype=float).T, None]
+            sizes = [a if a is not None and (label or b is None) else b for a, b in zip(of_label, sizes, strict=True)]
+            names = names or tuple(cells)
+            break
+    return sizes, names or found.texts.get("propeller") or (Path(found.file or found.name).stem,) * N
+
+
+def _checked(
+    found: Dataset, D: float | None, pitch: float | None, ducted: bool
+) -> tuple[Dataset, list[str], list[str]]:
+    """The rows that the checks of recordings leave; what contradicts a whole column of a fit, and some of its rows."""
+    findings = check(found, diameter_m=D, pitch_m=pitch, ducted=ducted)
+    loaded = named(found)
+    used = {"diameter_m", "pitch_m", *(file_name(loaded, k) for k in _USED)}
+    told = [f for f in findings if f.severity != "note" and used & {*f.channel.split("+")}]
+    whole, rows = ([f"{f.channel}: {f.evidence}. {f.correction}" for f in told if bool(f.rows) == part]
+                   for part in (False, True))  # fmt: skip
+    return left_out(found, findings), whole, rows
+
+
+_USED = ("rpm", "thrust_N", "CT", "J", "airspeed_m_s", "density_kg_m3", "temperature_K", "pressure_Pa")
+
+
+def _from_table(file: str, found: Dataset, label: str | None = None) -> Gathered:
+    """Steady points of each propeller of a recording, or of any table with the columns of the module notes."""
+    (D, pitch, B, duct), names = _sizes(found, label)
+    loaded = named(found)
+    needed = {"diameter (with its unit)": D is not None, "pitch (with its unit)": pitch is not None,
+              "rpm": "rpm" in loaded,
+              "thrust (with its unit) or CT": bool({"thrust_N", "CT"} & {*loaded.values})}  # fmt: skip
+    missing = [what for what, there in needed.items() if not there]
+    if missing:
+        return [], [f"{file}: no column {', '.join(missing)}{in_one_step(found)}"], []
+    notes = [] if B is not None else [f"{file}: no column blades, 2 assumed"]
+    B, duct = np.full(len(found), 2.0) if B is None else B, np.zeros(len(found)) if duct is None else duct
+    sized = replace(found, values={**found.values, "diameter_m": D, "pitch_m": pitch}, lines=loaded.lines)
+    groups: dict[tuple[str, float, float, float, bool], list[int]] = {}
+    bad: list[int] = []
+    for i, key in enumerate(zip(names, D, pitch, B, duct > 0, strict=True)):
+        known = all(np.isfinite(v) and v > 0 for v in key[1:4]) and key[3] == round(key[3])
+        if known:
+            groups.setdefault(key, []).append(i)
+        else:
+            bad.append(sized.lines[i])
+    refused = [f"{file}: no positive diameter, pitch and blade count (lines {some(bad)})"] if bad else []
+    if not groups:
+        return [], refused, notes
+    checked = {key: _checked(sized.select(np.array(at)), key[1], key[2], key[4]) for key, at in groups.items()}
+    sound = [key for key, (_, wrong, _) in checked.items() if not wrong]
+    # of few rows each, or all alike: together they say more
+    rest = sized.select(np.sort(np.concatenate([groups[key] for key in sound or groups])))
+    _, wrong, _ = _checked(rest, None, None, bool(np.any(duct > 0)))
+    if wrong:
+        checked, refused = {}, [*refused, *(f"{file}: {words}" for words in wrong)]
     rows: list[Rows] = []
-    for (name, d, p, b, inside), at in groups.items():
-        maker = str(name).split("_")[0].split(" ")[0]
-        made = MeasuredPropeller(str(name), maker, path.name, float(d), float(p), int(b), inside)
-        rows.append((made, rpm[at], J[at], CT[at]))
-    return (
-        rows,
-        [f"{path}: {number_of(bad, 'row')} without a positive diameter, pitch and blade count"] if bad else [],
-        notes,
-    )
+    for (name, d, p, b, inside), (part, wrong, doubtful) in checked.items():
+        made = MeasuredPropeller(str(name), re.split("[_ ]", str(name))[0], Path(file).name, d, p, int(b), bool(inside))
+        if not wrong:
+            with gathered(faults := list[Fault]()):
+                points = reduce(part, diameter_m=d)
+            wrong = [fault.got for fault in faults]
+        if wrong:
+            refused += [f"{file}: {name}: {words}" for words in wrong]
+            continue
+        refused += [f"{file}: {name}: {words}" for words in dropped_words(reduction(points))]
+        notes += [f"{file}: {name}: {words}" for words in doubtful]
+        if "CT" not in points and "thrust_N" in points:
+            points = points.derive(d, RHO)
+            notes.append(f"{file}: no density, {RHO:g} kg/m3 assumed")
+        if not {"rpm", "CT"} <= points.values.keys():
+            refused.append(f"{file}: {name}: no row with a speed and a thrust")
+            continue
+        rows.append((made, points.rpm, points["J"] if "J" in points else np.zeros(len(points)), points["CT"]))
+    return rows, refused, list(dict.fromkeys(notes))
 
 
-def _file(path: Path) -> tuple[list[Rows], list[str], list[str]]:
+def _file(path: Path, label: str | None = None) -> Gathered:
     """Rows, refusals and notes of one file."""
     try:
         found = importers.read(path)
@@ -210,7 +252,7 @@ def _file(path: Path) -> tuple[list[Rows], list[str], list[str]]:
     if isinstance(found, (uiuc.UiucStatic, uiuc.UiucLine, uiuc.UiucGeometry, uiuc.UiucThickness)):
         return *_from_uiuc_table(path, found), []
     if isinstance(found, Dataset):
-        return _from_table(path, found)
+        return _from_table(os.fspath(path), found, label)
     return [], [f"{path}: a {type(found).__name__} says nothing of diameter, pitch, rpm and thrust"], []
 
 
@@ -221,7 +263,7 @@ def files(path: Path) -> list[Path]:
     return [f for f in sorted(path.rglob("*")) if f.is_file() and not f.name.startswith(".")]
 
 
-def _folder(path: Path, without: frozenset[Path]) -> tuple[list[Rows], list[str], list[str]]:
+def _folder(path: Path, without: frozenset[Path], label: str | None) -> Gathered:
     """Rows, refusals and notes of a folder: the UIUC files as an archive, every other file for itself."""
     rows: list[Rows] = []
     refused: list[str] = []
@@ -241,29 +283,35 @@ def _folder(path: Path, without: frozenset[Path]) -> tuple[list[Rows], list[str]
     for file in found:
         if file.resolve() in without:
             continue
-        made, why, note = _file(file)
+        made, why, note = _file(file, label)
         rows += made
         refused += why
         notes += note
     return rows, refused, notes
 
 
-def load(paths: Iterable[str | os.PathLike[str]], without: frozenset[Path] = frozenset()) -> FitPoints:
-    """Gather the points of files and folders."""
+def load(
+    given: Iterable[str | os.PathLike[str] | Dataset], without: frozenset[Path] = frozenset(), label: str | None = None
+) -> FitPoints:
+    """Gather the points of files, folders and tables; ``label``: the propeller of tables that do not say theirs."""
     rows: list[Rows] = []
     refused: list[str] = []
     notes: list[str] = []
     faults: list[Fault] = []
-    for item in paths:
+    for one in given:
+        item = one.name if isinstance(one, Dataset) else os.fspath(one)
         path = Path(item)
-        if not path.exists():
-            faults.append(Fault(os.fspath(item), "", "no such file or folder", "a file or folder", "Check the path"))
+        if isinstance(one, Dataset):
+            made, why, note = _from_table(item, one, label)
+        elif not path.exists():
+            faults.append(Fault(item, "", "no such file or folder", "a file or folder", "Check the path"))
             continue
-        made, why, note = _folder(path, without) if path.is_dir() else _file(path)
+        else:
+            made, why, note = _folder(path, without, label) if path.is_dir() else _file(path, label)
         if not made:
             more = f" ({'; '.join(why[:3])})" if why else ""
-            hint = "Needed are diameter, pitch, rpm and thrust or CT"
-            faults.append(Fault(os.fspath(item), "", f"no usable point{more}", "measured propellers", hint))
+            hint = "Needed are diameter and pitch (--label 10x4.5 states them), rpm and thrust or CT"
+            faults.append(Fault(item, "", f"no usable point{more}", "measured propellers", hint))
         rows += made
         refused += why
         notes += note
@@ -271,17 +319,25 @@ def load(paths: Iterable[str | os.PathLike[str]], without: frozenset[Path] = fro
     return join(rows, refused, notes)
 
 
-def _found(name: str) -> str:
-    """Path as given, or the database of this name (``uiuc/volume-2``)."""
-    return name if Path(name).exists() else str(find_data(name) or name)
+def given(name: str, value: Any) -> list[str | Dataset]:
+    """Paths and tables of a caller: one, or several."""
+    several = value if isinstance(value, (list, tuple)) else [value]
+    return [v if isinstance(v, Dataset) else from_pandas(v) if hasattr(v, "columns") else path_text(name, v)
+            for v in several]  # fmt: skip
 
 
-def _resolved(name: str) -> frozenset[Path]:
+def _found(name: str | Dataset) -> str | Dataset:
+    """Table or path as given, or the database of this name (``uiuc/volume-2``)."""
+    return name if isinstance(name, Dataset) or Path(name).exists() else str(find_data(name) or name)
+
+
+def _resolved(name: str | Dataset) -> frozenset[Path]:
     """Files that a name stands for, each under its one true name."""
-    return frozenset(file.resolve() for file in files(Path(_found(name))))
+    found = _found(name)
+    return frozenset() if isinstance(found, Dataset) else frozenset(file.resolve() for file in files(Path(found)))
 
 
-def _twice(option: str, names: Iterable[str], seen: dict[Path, str]) -> list[Fault]:
+def _twice(option: str, names: Iterable[str | Dataset], seen: dict[Path, str]) -> list[Fault]:
     """Names that stand for files seen before; what they stand for is added to those."""
     faults = []
     hint = "Held-out data must not be fitted" if option == "--test" else "FitPoints that count twice weigh twice"
@@ -289,15 +345,19 @@ def _twice(option: str, names: Iterable[str], seen: dict[Path, str]) -> list[Fau
         own = _resolved(name)
         again = sorted(own & seen.keys())
         if again:
-            some = ", ".join(file.name for file in again[:3]) + (", ..." if len(again) > 3 else "")
-            got = f"files that {seen[again[0]]} holds too ({len(again)}: {some})"
-            faults.append(Fault(option, name, got, "every file once", hint))
+            names_of = ", ".join(file.name for file in again[:3]) + (", ..." if len(again) > 3 else "")
+            got = f"files that {seen[again[0]]} holds too ({len(again)}: {names_of})"
+            faults.append(Fault(option, str(name), got, "every file once", hint))
         seen |= {file: f"{option} {name}" for file in own if file not in seen}
     return faults
 
 
-def read(given: Sequence[str], test: Sequence[str] = ()) -> tuple[FitPoints, FitPoints | None]:
+def read(
+    given: Sequence[str | Dataset], test: Sequence[str | Dataset] = (), label: str | None = None
+) -> tuple[FitPoints, FitPoints | None]:
     """FitPoints to fit (of the data found when none are named) and held-out points; all faults of both at once."""
+    if label is not None:
+        read_label(label)
     if not given and find_data("uiuc") is None:
         hint = "Name files, or fetch a database: bemt lab fetch uiuc"
         raise InputError(Fault("FILES", "", "none, and no UIUC data found", "measured propellers", hint))
@@ -313,7 +373,7 @@ def read(given: Sequence[str], test: Sequence[str] = ()) -> tuple[FitPoints, Fit
     read: list[FitPoints] = []
     for which, without in ((names, held), (test, frozenset[Path]())):
         with gathered(faults):
-            read += [load(map(_found, which), without)] if which else []
+            read += [load(map(_found, which), without, label)] if which else []
     refuse(faults)
     points = read[0]
     if held:

@@ -544,7 +544,10 @@ def propeller(
     if label is not None:
         told_by = None if reading is None else reading_text(reading)
         text = fresh.label_text(label, blades, rpm, airspeed_m_s, reading=told_by)
-        return Propeller(case_of(text), text)
+        case = case_of(text)
+        if reading is not None:
+            case.as_built()  # refuses a reading that no such rotor gives
+        return Propeller(case, text)
     assert stations is not None
     ((value, unit),) = told.values()
     diameter_m, file = value * unit, Path(stations)

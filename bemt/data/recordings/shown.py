@@ -98,7 +98,8 @@ def points_text(reduced: Dataset | str) -> list[str]:
     return [
         f"  {tables.number_of(n, 'steady point')}, {what}{many}:",
         tables.text_table(list(columns), rows, (len(columns) - 1,), "    "),
-        *_dropped(how), *(f"  shared by all points, {text}" for text in shared), *(f"  . {t}" for t in reduced.notes),
+        *(f"  {text}" for text in dropped_words(how)), *(f"  shared by all points, {text}" for text in shared),
+        *(f"  . {t}" for t in reduced.notes),
     ]  # fmt: skip
 
 
@@ -129,7 +130,7 @@ def _cell(name: str, value: float, digits: int) -> str:
     return tables.number_text(float(value) if math.isfinite(value) else None, digits)
 
 
-def _dropped(how: Reduction) -> Iterator[str]:
+def dropped_words(how: Reduction) -> Iterator[str]:
     """What was left out, with its lines, a reason a line."""
     reasons: dict[tuple[str, str], list[tuple[int, int]]] = {}
     for lost in how.dropped:
@@ -138,7 +139,7 @@ def _dropped(how: Reduction) -> Iterator[str]:
     for (what, reason), lines in reasons.items():
         text = ranges(lines)
         text = text if len(text) <= 90 else text[:90].rsplit(",", 1)[0] + ", ..."
-        yield f"  dropped {sum(b - a + 1 for a, b in lines)} {what} (lines {text}): {reason}"
+        yield f"dropped {sum(b - a + 1 for a, b in lines)} {what} (lines {text}): {reason}"
 
 
 _OF_RUNS = {"rpm": "rev/min", "airspeed_m_s": "V [m/s]", "J": "J", "thrust_N": "thrust [N]",

@@ -133,9 +133,11 @@ def _quantities(facts: Facts) -> dict[str, Array]:
             if name in facts.raw and np.any(np.isfinite(facts.raw[name])):
                 q[key] = np.abs(facts.raw[name])
     n = len(facts)
-    for key, length in (("D", facts.diameter_m), ("p", facts.pitch_m)):
+    for key, length, column in (("D", facts.diameter_m, "diameter_m"), ("p", facts.pitch_m, "pitch_m")):
         if length is not None and length > 0.0:
             q[key] = np.full(n, length)
+        elif column in facts.raw:  # several rotors
+            q[key] = np.abs(facts.raw[column])
     optical, electrical = facts.optical_rpm, facts.electrical_rpm
     if optical is not None and electrical is not None:
         q["n2"] = np.abs(electrical if facts.named("rpm") == "optical_rpm" else optical) / 60.0
@@ -230,11 +232,12 @@ def relations(facts: Facts) -> list[Relation]:
     add("speed over voltage [rev/min/V]", {"n": 1.0, "U": -1.0}, 60.0, (20.0, MOST_RPM_PER_V), (700.0, 3.0), any_row)
     add("supply voltage [V]", {"U": 1.0}, 1.0, (0.5, 1000.0), (15.0, 3.0), any_row)
     if "p" in q and "D" in q and not duct:
-        ratio = float(q["D"][0] / q["p"][0])
-        if empirical.D_OVER_P_USABLE[0] <= ratio <= empirical.D_OVER_P_USABLE[1]:
-            model = np.asarray(empirical.thrust(q["D"][0], q["p"][0], 60.0, 0.0, rho), dtype=float)  # at 1 rev/s
-            powers = {"T": 1.0, "n": -2.0, "D": -3.5}
-            add("thrust over that of the K1/K2 formula", powers, q["D"] ** 3.5 / model, (0.35, 2.5), (1.0, 1.25))
+        low, high = empirical.D_OVER_P_USABLE
+        usable = (low * q["p"] <= q["D"]) & (q["D"] <= high * q["p"])
+        D, pitch = (np.where(usable, q[k], 1.0) for k in ("D", "p"))
+        model = np.asarray(empirical.thrust(D, pitch, 60.0, 0.0, rho), dtype=float)  # at 1 rev/s
+        scale = np.where(usable, D**3.5 / model, np.nan)
+        add("thrust over that of the K1/K2 formula", {"T": 1.0, "n": -2.0, "D": -3.5}, scale, (0.35, 2.5), (1.0, 1.25))
     return out
 
 
@@ -249,7 +252,7 @@ def _told(q: str, facts: Facts) -> str:
 def _repairs(known: list[Relation], facts: Facts) -> list[tuple[float, Slip]]:
     """Slips that repair all that is broken and break nothing else, with what they leave; best first."""
     broken = [r for r in known if r.broken]
-    quantities = {q for r in known for q in r.powers} - ({"D"} if facts.diameter_m is None else set())
+    quantities = {q for r in known for q in r.powers}
     two_speeds = any("n2" in r.powers for r in broken)
     fits: list[tuple[float, Slip]] = []
     for slip in slips() if broken else ():

@@ -83,7 +83,8 @@ def from_pandas(frame: pd.DataFrame, kind: str = "bench", name: str = "table", *
     ----------
     frame : pandas.DataFrame
         Columns ``rpm``, coefficients, or names that end in a unit (``thrust_N``, ``thrust_gf``, ``airspeed_km_h``);
-        they are converted to SI by it. ``u_<column>`` is a standard uncertainty, ``flags`` words joined by "; ".
+        they are converted to SI by it. ``u_<column>`` is a standard uncertainty, ``flags`` words joined by "; ";
+        columns of text stay text.
     kind, name : str
         As for :class:`Dataset`.
     **more
@@ -112,6 +113,7 @@ def from_pandas(frame: pd.DataFrame, kind: str = "bench", name: str = "table", *
     values: dict[str, Array] = {}
     u: dict[str, Array] = {}
     u_by: dict[str, dict[str, Array]] = {}
+    texts: dict[str, tuple[str, ...]] = {}
     for heading in map(str, frame.columns):
         if heading == "flags":
             continue
@@ -124,7 +126,10 @@ def from_pandas(frame: pd.DataFrame, kind: str = "bench", name: str = "table", *
             base_unit = (unit.dimension, 1.0, 0.0)
             si = next(s for s, o in units.UNITS.items() if (o.dimension, o.factor, o.offset) == base_unit)
             scale, offset, channel = unit.factor, unit.offset, f"{base}_{si}"
-        elif fault := channel_fault(column):
+        elif (fault := channel_fault(column)) and all(isinstance(cell, str) for cell in frame[heading]):
+            texts[heading] = tuple(frame[heading])
+            continue
+        elif fault:
             faults.append(Fault(name, heading, *fault))
             continue
         try:
@@ -142,4 +147,5 @@ def from_pandas(frame: pd.DataFrame, kind: str = "bench", name: str = "table", *
     flags = tuple(tuple(w for w in str(words).split("; ") if w) for words in frame["flags"]) if "flags" in frame else ()
     counted = isinstance(frame.index, pd.RangeIndex)
     labels = () if counted else tuple(map(str, frame.index))
-    return Dataset(kind, name, values, u, flags, more.pop("provenance", {}), labels, u_by, more.pop("notes", ()))
+    about, notes = more.pop("provenance", {}), more.pop("notes", ())
+    return Dataset(kind, name, values, u, flags, about, labels, u_by, notes, texts=texts)

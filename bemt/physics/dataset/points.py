@@ -11,6 +11,7 @@ it is split by :data:`ORIGINS`, and the total is the root sum square.
 
 from __future__ import annotations
 
+import difflib
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -47,6 +48,12 @@ def _still(array: NDArray[Any]) -> bool:
             return False
         part = part.base
     return not array.flags.writeable
+
+
+def _absent(channel: str, values: Mapping[str, Any]) -> str:
+    """Words on a channel that is not there, with the nearest that is."""
+    near = difflib.get_close_matches(channel, values, 1)
+    return f"no channel {channel!r}{f' (did you mean {near[0]}?)' if near else ''}; there are {', '.join(values)}"
 
 
 def _frozen(array: ArrayLike) -> Array:
@@ -191,7 +198,7 @@ class Dataset:
     def __getitem__(self, channel: str) -> Array:
         """One channel, (N,), read-only."""
         if channel not in self.values:
-            raise KeyError(f"no channel {channel!r}; there are {', '.join(self.values)}")
+            raise KeyError(_absent(channel, self.values))
         channel_values: Array = self.values[channel]
         return channel_values
 
@@ -272,7 +279,7 @@ class Dataset:
         values, name = self.__dict__.get("values", {}), channel.removeprefix("u_")
         if channel in values or name in values:
             return values[channel] if channel in values else self.u[name]  # type: ignore[no-any-return]
-        raise AttributeError(f"no channel {channel!r}; there are {', '.join(values)}")
+        raise AttributeError(_absent(channel, values))
 
     def unit(self, channel: str) -> str:
         """Unit of a channel.

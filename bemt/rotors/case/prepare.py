@@ -234,7 +234,8 @@ def k1k2_case(
     if np.isnan(pitch):
         pitch = case.rotor().blade.pitch_m()
     hub = case.hub_diameter_m if case.ducted else 0.0
-    found = k1k2.estimate(case.diameter_m, pitch, rpm, airspeed_m_s, air, hub, case.ducted)
+    m = case.file.model
+    found = k1k2.estimate(case.diameter_m, pitch, rpm, airspeed_m_s, air, hub, case.ducted, m.K1, m.K2, m.u_K1K2)
     angle = np.asarray(case.angle_deg if angle_deg is None else angle_deg, dtype=float)
     skewed = np.broadcast_to((angle != 0.0) & (np.asarray(airspeed_m_s) != 0.0), (len(found),))
     why = "K1/K2 knows axial flow only"

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.toml import Axis, FieldLimits, Table, axis_values, entry, expected, shown
+from bemt.physics import k1k2
 from bemt.physics.air import LIQUID
 from bemt.physics.sections.rule import DRAG_LEVEL, N_CRIT
 from bemt.physics.wake import MOUNT_DRAG, SWIRL, WAKE_RADIUS
@@ -339,6 +340,9 @@ class ModelTable(Table):
         "factor on the profile drag of the section rule", "", 0.3, 3, _percent("drag_level", 20.0), default=DRAG_LEVEL
     )
     stations: int = entry("number of blade elements", low=5, high=1000, default=40)
+    K1: float = entry("of the K1/K2 column", "", 0.01, 10, default=k1k2.K1)
+    K2: float = entry("its exponent", "", 0.1, 5, default=k1k2.K2)
+    u_K1K2: float = entry("its relative u", "", 0, 5, default=k1k2.U_MEASURED)
 
 
 class SweepTable(Table):

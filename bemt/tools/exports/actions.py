@@ -47,7 +47,8 @@ def export(
     format : str or sequence of str
         Targets, such as stl, jsbsim or qprop; docs/exports.md lists them.
     rpm : float, optional
-        Highest speed of tables and fits, speed of a disk or of openfoam; from the case by default. [rev/min]
+        Highest speed of tables, speed of a disk or of openfoam; from the case by default. A model of few numbers
+        (gazebo, rotorpy, px4, ardupilot) has the loads of this speed at rest. [rev/min]
     airspeed_m_s : float, optional
         Axial speed of disks, blades and openfoam; from the case by default. [m/s]
     hold : sequence of str

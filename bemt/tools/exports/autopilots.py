@@ -9,7 +9,7 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.base.units import G0
 from bemt.tools.exports.base import Files, Job, LoadsExport
-from bemt.tools.exports.parts import header, plain_name, written
+from bemt.tools.exports.parts import fit_weight, header, plain_name, written
 
 # PX4: parameters of the simulator in hardware (SIH), of control allocation and of the thrust curve.
 
@@ -36,7 +36,7 @@ class Px4Export(LoadsExport):
         "fixes the directions of its own rotors and takes no direction for the forward propeller",
         f"CA_ROTOR0_CT is written up to the {MOST_CT:g} that PX4 takes; the allocation is normalised, so with "
         "equal rotors the value does not matter",
-        "one quadratic for all speeds: Reynolds and Mach number are averaged over the table",
+        "one quadratic for all speeds: no Reynolds or Mach number",
     )
 
     def write(self, job: Job) -> Files:
@@ -100,11 +100,11 @@ def fits(job: Job) -> tuple[Array, Array]:
     """Quadratics of CT and CP over J from rest to zero thrust, concave, relative to the coefficient at rest."""
     from scipy.optimize import lsq_linear
 
-    t = job.performance
+    t = job.fitted
     rpm, J, CT, CP = t.flight_nodes()
     found = []
     for C, table in ((CT, t.CT), (CP, t.CP)):
-        w = 1.0 / np.interp(rpm, t.rpm, table[:, t.at_rest])
+        w = fit_weight(job, J) / np.interp(rpm, t.rpm, table[:, t.at_rest])
         A = np.stack([w, J * w, J**2 * w], axis=1)
         fit = lsq_linear(A, C * w, bounds=([0.0, -np.inf, -np.inf], [np.inf, np.inf, 0.0])).x
         fit[2] = min(float(fit[2]), 0.0)
@@ -190,12 +190,12 @@ class ArdupilotExport(LoadsExport):
 
 def _fit(job: Job, e: float) -> tuple[float, float]:
     """Effective area [m2] and outflow speed at full command [m/s], least squares of T over rest to zero thrust."""
-    t = job.performance
+    t = job.fitted
     rpm, J, CT, _ = t.flight_nodes()
     n = rpm / 60.0
-    c, V = rpm / t.rpm[-1], J * n * t.diameter_m
+    c, V = rpm / job.performance.rpm[-1], J * n * t.diameter_m
     T = CT * t.rho * n**2 * t.diameter_m**4
-    w = 1.0 / np.interp(rpm, t.rpm, t.thrust_N[:, t.at_rest])
+    w = fit_weight(job, J) / np.interp(rpm, t.rpm, t.thrust_N[:, t.at_rest])
     A = 0.5 * t.rho * np.stack([(e * c**2 + (1.0 - e) * c) * w, -(V**2) * w], axis=1)
     a, b = np.linalg.lstsq(A, T * w, rcond=None)[0]
     return float(b), float(np.sqrt(a / b))

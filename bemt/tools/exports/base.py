@@ -23,6 +23,7 @@ from bemt.tools.exports.performance import (
     Loading,
     Performance,
     StatedBand,
+    at_speed,
     band_of,
     loading_of,
     oblique_loads,
@@ -89,6 +90,9 @@ class Job:
         Options of single targets by name, as :attr:`Export.options` declares them; what is missing is its default.
     slow : bool
         Whether tables start at a twentieth of the greatest speed, else at a quarter.
+    matched_rpm : float or None
+        Speed at which a model of few numbers has the loads of BEMT at rest; None: least squares over all speeds.
+        [rev/min]
     """
 
     case: Case
@@ -100,6 +104,7 @@ class Job:
     printed: Print | None = None
     own: Mapping[str, Any] = field(default_factory=dict)
     slow: bool = True
+    matched_rpm: float | None = None
 
     @property
     def rpm_top(self) -> float:
@@ -143,8 +148,19 @@ class Job:
 
     @cached_property
     def flown(self) -> Job:
-        """Request from a quarter of full throttle up to it, for a target whose few numbers are fitted to flight."""
-        return replace(self, rpm=self.rpm_full, slow=False)
+        """Request from a quarter of full throttle up to it, for a target whose few numbers are fitted to flight.
+
+        Where they are matched at a speed, the range stays that of the case and its motor.
+        """
+        at = self.matched_rpm
+        top = self.rpm_full if at is None else max(replace(self, rpm=None).rpm_full, at)
+        return replace(self, rpm=top, slow=False)
+
+    @cached_property
+    def fitted(self) -> Performance:
+        """What few numbers are fitted to: the whole table, or its flight at the speed where they are matched."""
+        table = self.performance
+        return table if self.matched_rpm is None else at_speed(self.case, table, self.matched_rpm)
 
     @property
     def speeds_note(self) -> str | None:
@@ -292,6 +308,17 @@ class LoadsExport(Export):
     def asked(self, job: Job) -> Job:
         """Request as the target takes it: numbers without a table are fitted up to full throttle."""
         return job if "reynolds" in self.features else job.flown
+
+    def notes(self, job: Job) -> list[str]:
+        """Where the numbers are those of BEMT, for a model that has them at one speed or at none."""
+        t, at = self.asked(job).performance, self.asked(job).matched_rpm
+        if "reynolds" in self.features:
+            return super().notes(job)
+        span = f"{t.rpm[0]:.6g} to {t.rpm[-1]:.6g} rev/min"
+        how = f"fitted to {span} alike: --rpm N matches them at rest at the speed that you fly"
+        if at is not None:
+            how = f"matched at rest at {at:.6g} rev/min; fit_error_pct tells {span}"
+        return [*super().notes(job), f"the constants are {how}"]
 
     @abstractmethod
     def loads(self, files: Files, rpm: Array, airspeed_m_s: Array) -> tuple[Array, Array]:

@@ -267,7 +267,7 @@ def export_cases(
         folder = Path(out) / case.name if len(paths) > 1 else Path(out)
         try:
             case = case if rotation is None else case.replaced({"rotor.rotation": rotation})
-            job = Job(case, rpm, airspeed, hold, unit, solid, printed, asked)
+            job = Job(case, rpm, airspeed, hold, unit, solid, printed, asked, matched_rpm=rpm)
             made.append((export_case(job, folder, formats, progress), folder))
         except PartlyRefused as error:
             made.append((error.manifest, folder))

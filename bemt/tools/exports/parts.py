@@ -160,10 +160,11 @@ def written(files: Files, end: str) -> str:
 def header(job: Job, title: str) -> list[str]:
     """Lines for the head of a text file."""
     table = job.performance
+    matched = "" if job.matched_rpm is None else f"; loads at rest matched at {job.matched_rpm:.6g} rev/min"
     return [
         f"{title}: {job.case.name}, written by bemt {__version__}",
         f"{table.rpm[0]:.6g} to {table.rpm[-1]:.6g} rev/min, J 0 to {table.J_zero.max():.4g}, "
-        f"density {table.rho:.6g} kg/m3; fit error, band and range: manifest.json",
+        f"density {table.rho:.6g} kg/m3; fit error, band and range: manifest.json{matched}",
     ]
 
 
@@ -181,6 +182,15 @@ def static_fit(table: Performance) -> tuple[float, float]:
     W = table.rpm * np.pi / 30.0
     T, Q = table.thrust_N[:, table.at_rest], table.torque_Nm[:, table.at_rest]
     return tuple(float(np.sum(W**2 / y) / np.sum((W**2 / y) ** 2)) for y in (T, Q))  # type: ignore[return-value]
+
+
+HEAVY = 1e4
+"""Weight of rest in a fit that is matched there: flight moves it by 1e-6 at most. [1]"""
+
+
+def fit_weight(job: Job, J: Array) -> Array:
+    """What nodes at these advance ratios count in a fit of few numbers, (N,) [1]."""
+    return np.where((J == 0.0) & (job.matched_rpm is not None), HEAVY, 1.0)
 
 
 def edgewise(job: Job) -> tuple[Array, Array, Array]:

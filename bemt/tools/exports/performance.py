@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -259,6 +259,18 @@ def performance_of(case: Case, rpm_top: float, slow_too: bool = True) -> Perform
         J_zero=J_zero, diameter_m=D, rho=float(air.rho), a_sound=float(air.a_sound), mu=float(air.mu),
         blades=int(case.rotor().B), sense=int(case.rotor().rotation),
     )  # fmt: skip
+
+
+def at_speed(case: Case, table: Performance, rpm: float) -> Performance:
+    """The flight range of a table, from rest to zero thrust, solved at one speed [rev/min]."""
+    zero = zero_thrust(case, np.array([rpm]))
+    J = np.linspace(0.0, float(zero[0]), N_J + 1)
+    n, D = rpm / 60.0, table.diameter_m
+    found = solve_points(case, rpm, J * n * D)
+    T, Q = found.thrust_N[None], found.torque_Nm[None]
+    scale = table.rho * n**2 * D**4
+    return replace(table, rpm=np.array([rpm]), J=J, thrust_N=T, torque_Nm=Q, CT=T / scale,
+                   CP=2.0 * np.pi * Q / (scale * D), J_zero=zero)  # fmt: skip
 
 
 def _slow(case: Case, ready: Model, rpm_top: float, J: Array, flight: NDArray[np.bool_]) -> Array:

@@ -10,6 +10,7 @@ from bemt.base.arrays import Array
 from bemt.tools.exports.base import Files, Job, LoadsExport
 from bemt.tools.exports.parts import (
     edgewise,
+    fit_weight,
     header,
     inertia_estimate,
     plain_name,
@@ -48,7 +49,7 @@ class GazeboExport(LoadsExport):
         """SDF model of a stand whose plugin is fitted at rest."""
         job = self.asked(job)
         t, name = job.performance, plain_name(job.case.name)
-        (kT, kQ), izz = static_fit(t), inertia_estimate(job)
+        (kT, kQ), izz = static_fit(job.fitted), inertia_estimate(job)
         drag, roll = _fit_hub(job)
         comment = "\n".join(f"<!-- {line.replace('--', '-')} -->" for line in header(job, "Gazebo motor model"))
         text = f"""<?xml version="1.0"?>
@@ -166,11 +167,11 @@ rotor_direction = {-t.sense}
     def notes(self, job: Job) -> list[str]:
         """What this model class leaves out."""
         return [
+            *super().notes(job),
             "torque does not change with airspeed in this model; no Reynolds or Mach number",
             "k_d, k_h and k_flap are fitted in edgewise flow up to the airspeed of zero thrust; in this model side "
             "force and roll moment are 0, and torque does not change with a wind across the shaft",
             f"density {job.performance.rho:g} kg/m3 is in all constants: scale them with yours",
-            "k_eta weighs all speeds of the table alike; export with --rpm near the speed that you fly",
         ]
 
     def loads(self, files: Files, rpm: Array, airspeed_m_s: Array) -> tuple[Array, Array]:
@@ -196,10 +197,10 @@ def _rotorpy_hub(job: Job) -> tuple[float, float, float]:
 
 
 def _fit(job: Job) -> tuple[float, float, float]:
-    t = job.performance
+    t = job.fitted
     rpm, J, CT, CP = t.flight_nodes()
     # relative to the load at rest at the same speed, so that no speed dominates
-    ct0, cp0 = (np.interp(rpm, t.rpm, C[:, t.at_rest]) for C in (t.CT, t.CP))
+    ct0, cp0 = (np.interp(rpm, t.rpm, C[:, t.at_rest]) / fit_weight(job, J) for C in (t.CT, t.CP))
     a, b = np.linalg.lstsq(np.stack([1.0 / ct0, -J / ct0], axis=1), CT / ct0, rcond=None)[0]
     c = float(np.sum(CP / cp0**2) / np.sum(1.0 / cp0**2))
     scale = t.rho * t.diameter_m**4 / (2.0 * np.pi) ** 2

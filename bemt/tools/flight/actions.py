@@ -331,7 +331,11 @@ def _with_model(answer: FlightAnswer, case: str) -> FlightAnswer:
     inplane = rotor.solve(rpm=rpm, airspeed_m_s=across, angle_deg=90.0).thrust_N
     found = Predicted(hover / rpm**2, u / rpm**2, np.stack([along, axial / hover - 1.0]),
                       np.stack([across, inplane / hover - 1.0]))  # fmt: skip
-    return replace(answer, predicted=found)
+    answer = replace(answer, predicted=found)
+    if not answer.other_rotor:
+        return answer
+    step = replace(answer.judged.next, text=f"{answer.other_rotor}; then {answer.judged.next.text or 'fly again'}")
+    return replace(answer, judged=replace(answer.judged, next=step))
 
 
 @dataclass(frozen=True)

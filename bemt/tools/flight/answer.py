@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, refuse
+from bemt.base.tables import number_of
 from bemt.judge.diagnose.suggest import Suggestion
 from bemt.judge.explanation import NONE
 from bemt.judge.loss import Decision
@@ -54,6 +56,10 @@ class Predicted:
     inplane: NDArray[np.float64]
 
 
+FAR = math.log(2.0)
+"""Logarithm of the ratio of thrusts at one speed beyond which the propeller is in question: declared. [1]"""
+
+
 @dataclass(frozen=True, eq=False)
 class FlightAnswer:
     """What a flight shows and what is wrong."""
@@ -83,6 +89,30 @@ class FlightAnswer:
     # Usual demand in roll to the right, nose up and yaw to the right, and share of the time near the limit in yaw; as
     # shares of full; empty where it was not logged [1]
     demand: tuple[float, ...] = ()
+
+    @property
+    def over_case(self) -> tuple[float, float] | None:
+        """Thrust at equal speed over that of the case, and its half width (95 %) as a share of it; None without both.
+
+        Without a mass, the thrust is that of each kilogram.
+        """
+        k, said = self.found.constants.get("thrust constant"), self.predicted
+        if k is None or said is None:
+            return None
+        return k.value / said.constant, float(np.hypot(k.half / k.value, 2.0 * said.u / said.constant))
+
+    @property
+    def other_rotor(self) -> str:
+        """What to ask where the mass needs a thrust that no scatter of propellers explains; empty elsewhere."""
+        told = self.over_case
+        weighed = told is not None and self.found.constants["thrust constant"].unit == "N/rpm^2"
+        if told is None or not weighed or abs(math.log(told[0])) - told[1] < FAR:
+            return ""
+        ratio = told[0]
+        return (
+            f"Is it this rotor? The mass fits {ratio**0.5:.2f} times the logged speeds (pole pairs, marks), "
+            f"{ratio**0.25:.2f} times the diameter, or {1.0 / ratio:.2g} times the mass (kg?)"
+        )
 
     def document(self) -> dict[str, Any]:
         """JSON of schema bemt.flight/1."""
@@ -223,12 +253,16 @@ def _refuse_unlike(
 def _not_flown(log: FlightLog) -> FlightVerdict:
     """Verdict on a log without a flight that could be judged."""
     why = "the log shows no flight with all motors running"
+    if (seen := int(log.flying.sum())) and log.drive is not None and np.all(log.drive[log.flying].mean(axis=0) > 0.0):
+        why = f"{number_of(seen, 'sample')} in the air are too few"
     if not log.rotors:
         why = f"no output of {f'any of the {log.stated_rotors}' if log.stated_rotors else 'the'} motors was logged"
     elif log.airborne is not None and not np.any(log.airborne > 0.5):
         why = "the vehicle stays on the ground or disarmed all along, by the autopilot's own record"
     step = "log a flight of 10 s or more with the commands of the motors (ArduPilot RCOU or RATE, PX4 " \
            "actuator_motors, a Crazyflie's motor.m1 to m4)"  # fmt: skip
+    if log.ends:
+        why, step = f"{why}; the file {log.ends}", f"download the log again, whole; or {step}"
     said = Decision("insufficient", (), NONE, 1.0, why)
     return FlightVerdict(said, np.zeros(0), Suggestion(step, "run"))
 

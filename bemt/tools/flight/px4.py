@@ -52,10 +52,13 @@ def read(path: Path) -> FlightLog:
     try:
         with (path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data,
               contextlib.redirect_stdout(io.StringIO()), np.errstate(all="ignore")):  # fmt: skip
-            head, topics, damaged = _gathered(data)
+            head, topics, damaged, cut = _gathered(data)
             # pyulog knows the formats; of all messages it would take 4 us each.
             found = ulog(io.BytesIO(head), _TOPICS, disable_str_exceptions=True)
-        return _made(name, found, topics, damaged or found.file_corruption)
+        log = _made(name, found, topics)
+        if damaged or found.file_corruption:
+            return replace(log, ends=f"damaged; readable up to {log.t[-1]:.1f} s")
+        return replace(log, ends=f"ends within a message, after {log.t[-1]:.1f} s") if cut else log
     except InputError:
         raise
     except Exception as error:  # a parser meets any damage: struct, key, value, index, memory, its own
@@ -63,12 +66,14 @@ def read(path: Path) -> FlightLog:
         raise InputError(Fault(name, "", got, "whole ULog messages", "Download the log again")) from error
 
 
-def _gathered(data: mmap.mmap) -> tuple[bytearray, dict[int, _Messages], bool]:
+def _gathered(data: mmap.mmap) -> tuple[bytearray, dict[int, _Messages], bool, bool]:
     """What tells the formats, with one message of each used topic; those topics by number; whether there is damage.
+
+    Last, whether the file ends within a message.
 
     ULog file format, PX4 user guide. Behind damage the log goes on from the next mark, or byte.
     """
-    head, topics, at, damaged = bytearray(data[:16]), dict[int, _Messages](), 16, False
+    head, topics, at, damaged, short = bytearray(data[:16]), dict[int, _Messages](), 16, False, False
     start = struct.Struct("<HBH").unpack_from  # size, kind and, of data, the number of the topic
     stops, marked = [len(data)], True  # data may be appended behind what was cut
     while stops:
@@ -79,6 +84,7 @@ def _gathered(data: mmap.mmap) -> tuple[bytearray, dict[int, _Messages], bool]:
             if kind not in _KINDS or after > stop:
                 mark = data.find(_SYNC, at + 1, stop) if marked else -1
                 marked, cut = mark >= 0, kind in _KINDS
+                short = cut and not marked and stop == len(data)
                 damaged, at = damaged or not cut, mark + len(_SYNC) if marked else stop if cut else at + 1
                 continue
             topic = topics.get(number) if kind == _DATA else None
@@ -99,8 +105,9 @@ def _gathered(data: mmap.mmap) -> tuple[bytearray, dict[int, _Messages], bool]:
             elif kind in b"FPQ":
                 head += data[at:after]
             at = after
+        short |= at < stop == len(data)
         at = stop
-    return head, topics, damaged
+    return head, topics, damaged, short
 
 
 class _Messages:
@@ -138,7 +145,7 @@ class _Messages:
         return {key: rows[key] for key in first}
 
 
-def _made(name: str, found: Any, topics: Mapping[int, _Messages], damaged: bool) -> FlightLog:
+def _made(name: str, found: Any, topics: Mapping[int, _Messages]) -> FlightLog:
     tables: dict[str, dict[str, Array]] = {}
     for d in found.data_list:
         data, known = topics[d.msg_id].columns(d.data), tables.get(d.name)
@@ -179,10 +186,9 @@ def _made(name: str, found: Any, topics: Mapping[int, _Messages], damaged: bool)
     main = next((k for k in ("command", "rpm", "acceleration") if sources[k]), "thrust")
     kept = {k: params[k] for k in ("THR_MDL_FAC", "MPC_THR_HOVER") if np.isfinite(params.get(k, np.nan))}
     kept |= {"demanded": 1.0} if command.demanded else {}
-    log = joined(name, KIND, sources, main, raw=_bursts(tables.get("sensor_accel_fifo", {})) or acceleration,
-                 command_unit=command.unit, layout=_layout(params, B), mixed=command.mixed, date=_date(take),
-                 parameters=kept, stated_rotors=_stated(params))  # fmt: skip
-    return replace(log, ends=f"damaged; readable up to {log.t[-1]:.1f} s") if damaged else log
+    return joined(name, KIND, sources, main, raw=_bursts(tables.get("sensor_accel_fifo", {})) or acceleration,
+                  command_unit=command.unit, layout=_layout(params, B), mixed=command.mixed, date=_date(take),
+                  parameters=kept, stated_rotors=_stated(params))  # fmt: skip
 
 
 class _Command(NamedTuple):

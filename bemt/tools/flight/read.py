@@ -74,5 +74,17 @@ def _read(path: Path, head: bytes) -> FlightLog:
     reader = next((r for r in _READERS if r.sniff(head)), None)
     if reader is None:
         raise InputError(Fault(str(path), "", "unknown first bytes", "a usdlog, ULog, DataFlash or CSV"))
-    found: FlightLog = reader.read(path)
+    try:
+        found: FlightLog = reader.read(path)
+    except InputError as error:
+        named = _NAMED.get(path.suffix.lower())
+        if reader is not table or named is None:
+            raise
+        hint = "Is it the file that the autopilot wrote? Download it again"
+        got = f"first bytes that no {named.KIND} has"
+        raise InputError(Fault(str(path), "", got, f"a {named.KIND}, as its name says", hint)) from error
     return found
+
+
+_NAMED = {".ulg": px4, ".ulog": px4, ".bin": ardupilot}
+"""Readers of names that only their files have."""

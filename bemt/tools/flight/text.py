@@ -215,14 +215,14 @@ def _seen(a: FlightAnswer) -> list[str]:
 
 def _beside_case(a: FlightAnswer) -> list[str]:
     """Thrust at equal speed beside that of the case; without a mass, the mass that the case would carry."""
-    k, said = a.found.constants.get("thrust constant"), a.predicted
-    if k is None or said is None:
+    if a.over_case is None:
         return []
-    ratio, half = k.value / said.constant, np.hypot(k.half / k.value, 2.0 * said.u / said.constant)
-    if k.unit.endswith("/kg"):
+    ratio, half = a.over_case
+    if a.found.constants["thrust constant"].unit.endswith("/kg"):
         carried = f"{number_text(1e3 / ratio, 3)} ± {number_text(1e3 / ratio * half, 2)} g"
         return [f"With the thrust of the case at these speeds it would weigh {carried}: --mass-kg compares them."]
-    return [f"Thrust at equal speed: {100 * (ratio - 1.0):+.0f} ± {100 * ratio * half:.0f} % from the case."]
+    line = f"Thrust at equal speed: {100 * (ratio - 1.0):+.0f} ± {100 * ratio * half:.0f} % from the case."
+    return [line, *([f"{a.other_rotor}."] if a.other_rotor else [])]
 
 
 def _drives(a: FlightAnswer) -> list[str]:
