@@ -297,7 +297,9 @@ def calibrate(
     progress("K1 and K2")
     k1k2 = _k1k2(points, DRAWS, notes)
     CT = {key: CT_k1k2(points, c.K1, c.K2) for key, c in k1k2.items()}
-    apart = {key: left_out(points, key == "refit_flight") for key in ("refit", "refit_flight") if key in k1k2}
+    apart: dict[str, Array] = {
+        key: left_out(points, key == "refit_flight") for key in ("refit", "refit_flight") if key in k1k2
+    }
     CT |= apart
     rest = usable(points)
     w = weights(points.index[rest])

@@ -21,11 +21,10 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, gathered, refuse
 from bemt.base.given import find_data, path_text
-from bemt.base.tables import number_of
+from bemt.base.tables import number_of, some
 from bemt.base.units import INCH
 from bemt.data import readers as importers
 from bemt.data.readers import uiuc
-from bemt.data.readers.split import some
 from bemt.data.readers.uiuc_names import parse_file_name
 from bemt.data.recordings.channels import file_name, in_one_step, named
 from bemt.data.recordings.check import check, left_out
