@@ -77,9 +77,9 @@ class Part:
     instead: Array | None = None
     # Speed over pulse width as the reference shows it; None: as this recording itself does
     drive: SpeedCurve | None = None
-    # (C P,) What the rotor gives beyond the baseline, as a reference shows it: it goes with dynamic pressure, and cells
-    # read it, too; None: nothing
-    beyond: Array | None = None
+    # Loads beyond the baseline by channel, (P,) each, as a reference shows them: they go with dynamic pressure, and
+    # cells read them, too; None: nothing is shown [N], [N m], 0 of a speed
+    beyond: tuple[Array, ...] | None = None
     _solved: dict[tuple[Effect, ...], tuple[Array, Array, Flow]] = field(default_factory=dict, repr=False)
 
     @cached_property
@@ -110,14 +110,14 @@ class Part:
         values = {"thrust_N": T.copy(), "torque_Nm": Q.copy()}
         if "rpm" in self.record.measured:
             values["rpm"] = self.steady_rpm.copy()
-        beyond = np.zeros(len(self.channels) * T.size) if self.beyond is None else self.beyond
-        pressure = met.rho * met.rpm**2 / (self.flow.rho * self.flow.rpm**2)  # its coefficient stays
-        for c, more in zip(self.channels, np.split(beyond, len(self.channels)), strict=True):
-            values[c] = values[c] + (more if c == "rpm" else more * pressure)
+        more = dict(zip(self.channels, self.beyond or (), strict=False))
+        pressure = met.rho * met.rpm**2 / (self.flow.rho * self.flow.rpm**2)  # coefficients stay
+        for c, of_c in more.items():
+            values[c] = values[c] + of_c * pressure
         reading = Reading(values, self.full_scale)
         for e in effects:
             e.reading(reading, met)
-        return np.concatenate([reading.values[c] for c in self.channels]) - beyond
+        return np.concatenate([reading.values[c] - more.get(c, 0.0) for c in self.channels])
 
     def _respond(self, effects: Sequence[Effect]) -> tuple[Array, Array, Flow]:
         """Thrust [N] and torque [N m] with a set of effects, NaN where not converged, and the flow that is met."""
@@ -331,7 +331,7 @@ class Problem:
         full[self.kept] = beyond
         ends = np.cumsum([len(p.channels) * len(p.record) for p in self.parts])
         parts = (
-            replace(p, beyond=b if p.instead is None else None)
+            replace(p, beyond=tuple(b.reshape(-1, len(p.record))) if p.instead is None else None)
             for p, b in zip(self.parts, np.split(full, ends[:-1]), strict=True)
         )
         return replace(self, parts=tuple(parts), predicted={})
