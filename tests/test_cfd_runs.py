@@ -403,7 +403,7 @@ def test_what_an_audit_calls_not_stated_can_be_stated_by_the_key_that_it_names(
 ) -> None:
     foam(put)
     told = ["postProcessing", "--rpm", f"{RPM}", "--out", "run.toml", "--setup"]
-    assert main(["import", *told, "domian=3"]) == 2 and "domian: an unknown key" in capsys.readouterr().err
+    assert main(["import", *told, "domian=3"]) == 2 and "got an unknown key, domian" in capsys.readouterr().err
     values = {"domain_over_D": "8", "compressible": "yes", "balance_mass": "0.001", "balance_momentum": "-0.002",
               "wall": "function", "y_plus": "60", "turbulence": "k-omega SST"}  # fmt: skip
     assert main(["import", *told, "grids=1"]) == 0

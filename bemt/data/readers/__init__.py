@@ -71,11 +71,21 @@ class Reader:
 
 @dataclass(eq=False)
 class SourceText(Collector):
-    """Text of one input file, with its provenance and the faults found in it."""
+    """Text of one input file, with its provenance and the faults found in it.
 
-    name: str  # Path as given by the user; appears in faults
-    text: str  # Decoded content (see `decode`), without a byte order mark
-    sha256: str  # Hash of the bytes of the file, hexadecimal
+    Parameters
+    ----------
+    name : str
+        Path as given by the user; appears in faults.
+    text : str
+        Decoded content (see `decode`), without a byte order mark.
+    sha256 : str
+        Hash of the bytes of the file, hexadecimal.
+    """
+
+    name: str
+    text: str
+    sha256: str
 
     def __post_init__(self) -> None:
         Collector.__init__(self, self.name)
@@ -104,11 +114,21 @@ def _binary(raw: bytes) -> bool:
 
 
 def decode(raw: bytes) -> str:
-    r"""Text of a file or of its head, without a byte order mark.
+    r"""Text of bytes, or of the head of a file.
 
-    UTF-8, UTF-16 with its mark, Windows-1252, or another code in which a known heading shows; the last character of
-    UTF-8 that has others beyond ASCII may be cut.
+    Parameters
+    ----------
+    raw : bytes
+        UTF-8, UTF-16 with its mark, Windows-1252, or another code in which a known heading shows; the last character
+        of UTF-8 that has others beyond ASCII may be cut.
 
+    Returns
+    -------
+    str
+        Text without a byte order mark.
+
+    Examples
+    --------
     >>> decode("\ufeff°".encode("utf-16-le")), decode(b"\xb0")
     ('°', '°')
     """
@@ -165,7 +185,20 @@ def load_bytes(path: str | os.PathLike[str]) -> bytes:
 def load_text(path: str | os.PathLike[str]) -> SourceText:
     """Read a whole file, unpacking gzip and workbooks; the hash is that of the file as stored.
 
-    `InputError` if it cannot be read, is damaged, larger than :data:`MAX_BYTES`, or binary (contains NUL bytes).
+    Parameters
+    ----------
+    path : str or path
+        File to read.
+
+    Returns
+    -------
+    SourceText
+        Its text, name and hash.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is damaged, larger than :data:`MAX_BYTES`, or binary (contains NUL bytes).
     """
     name = os.fspath(path)
     raw = load_bytes(path)
@@ -177,8 +210,20 @@ def load_text(path: str | os.PathLike[str]) -> SourceText:
 
 
 def head_text(head: bytes | str) -> str:
-    r"""Text of the head of a file, for sniffers; the empty string for binary data.
+    r"""Text of the head of a file, for sniffers.
 
+    Parameters
+    ----------
+    head : bytes or str
+        First bytes of a file, or text.
+
+    Returns
+    -------
+    str
+        Text; the empty string for binary data.
+
+    Examples
+    --------
     >>> head_text(b"\xef\xbb\xbfRPM CT CP")
     'RPM CT CP'
     """
@@ -208,8 +253,21 @@ def first_cells(head: bytes | str) -> set[str]:
 
 
 def number(token: str) -> float | None:
-    """Read one finite decimal number, strictly, Fortran's ``1.0D+00`` too; None: it is none, as ``nan`` or ``1_000``.
+    """Read one finite decimal number, strictly.
 
+    Parameters
+    ----------
+    token : str
+        Text such as ``-1.5e-3``; Fortran's ``1.0D+00`` is accepted.
+
+    Returns
+    -------
+    float or None
+        The value, in the unit of the column; None if the text is not a finite number (``nan``, ``1,5``, ``0.34-NaN``,
+        ``1_000``).
+
+    Examples
+    --------
     >>> number("1.0D-02"), number("0,5"), number("nan"), number("1e999")
     (0.01, None, None, None)
     """
@@ -222,7 +280,18 @@ def number(token: str) -> float | None:
 
 @cache
 def importers() -> Mapping[str, Importer]:
-    """Readers in this folder, modules or objects, by kind; `TypeError` (a bug) where one lacks something."""
+    """Find the readers in this folder.
+
+    Returns
+    -------
+    mapping of str to module (or an object like one)
+        By kind, sorted; read-only.
+
+    Raises
+    ------
+    TypeError
+        If a module with a KIND lacks sniff or read, or repeats a kind (a bug, not an input error).
+    """
     found: dict[str, Importer] = {}
     for info in pkgutil.iter_modules(__path__):
         module = importlib.import_module(f"{__name__}.{info.name}")
@@ -239,9 +308,22 @@ def importers() -> Mapping[str, Importer]:
 
 
 def detect(path: str | os.PathLike[str]) -> str:
-    """Detect the format of a file from its content: kind of the only reader that claims it.
+    """Detect the format of a file from its content.
 
-    `InputError` if it cannot be read, if no reader claims it, or if two or more do (then give ``format =``).
+    Parameters
+    ----------
+    path : str or path
+        The file.
+
+    Returns
+    -------
+    str
+        Kind of the only reader that claims it.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, if no reader claims it, or if two or more do (then give ``format =``).
     """
     place, target, known = Collector(os.fspath(path)), Path(path), importers()
     if target.is_dir():
@@ -297,9 +379,24 @@ def _head(target: Path, place: Collector) -> bytes:
 
 
 def read(path: str | os.PathLike[str], format: str | None = None) -> Any:  # noqa: A002 - the key of the case file
-    """Read a file with the reader of its format, by default detected: what that reader's ``read`` gives.
+    """Read a file with the reader of its format.
 
-    `InputError` on an unknown format, or on faults in the data.
+    Parameters
+    ----------
+    path : str or path
+        The file.
+    format : str or None
+        Kind of the reader; None detects it from the content.
+
+    Returns
+    -------
+    Dataset or object
+        The return value of that reader's ``read``.
+
+    Raises
+    ------
+    InputError
+        On an unknown format, or on faults in the data.
     """
     known = importers()
     kind = detect(path) if format is None else format

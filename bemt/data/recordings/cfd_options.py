@@ -155,7 +155,7 @@ def run_from(
     made = validated(RunToml, {k: v for k, v in document.items() if k != "grids" or v}, out)
     for f in out.faults:
         key = f.where.removeprefix("setup.")
-        got = f.got if key == f.where else f"{key}: {f.got}"
+        got = f.got if key == f.where else f"{f.got}, {key}"
         faults.append(Fault("", _option(f.where), got, f.expected, f.hint))
     if faults or made is None:
         raise InputError(faults)

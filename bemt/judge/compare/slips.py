@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -60,7 +60,7 @@ def first_check(loads: Mapping[str, Sequence[BothLoads]], fluid: str, open_: Lef
     """What to check before any physics where ``loads`` differ; "" without it."""
     if elsewhere := "".join(_not_counted(name, own, open_.elsewhere) for name, own in loads.items()):
         return elsewhere
-    if one := fluid or _one_factor(loads, open_.units):
+    if one := fluid or _one_factor(loads, open_):
         return one
     slips = [slip for name, own in loads.items() if (slip := _slip(name, own, open_))[1]]
     # a unit explains all that differs, or nothing
@@ -124,7 +124,7 @@ def _slip(name: str, loads: Sequence[BothLoads], open_: LeftOpen) -> tuple[float
                    f"{error.stated}: check the unit.")  # fmt: skip
 
 
-def _one_factor(loads: Mapping[str, Sequence[BothLoads]], units_open: Collection[str]) -> str:
+def _one_factor(loads: Mapping[str, Sequence[BothLoads]], open_: LeftOpen) -> str:
     """What to check first where thrust and torque are off by one factor, which no unit of one explains; else ""."""
     ratio = [np.array([v.cfd / v.bemt for v in loads.get(k, ()) if v.cfd and v.bemt]) for k in KIND]
     if not all(r.size and np.all(r > 0.0) for r in ratio):
@@ -133,11 +133,13 @@ def _one_factor(loads: Mapping[str, Sequence[BothLoads]], units_open: Collection
     both = 0.5 * (thrust + torque)
     if abs(both) < math.log(_FAR) or abs(thrust - torque) > NEAR:
         return ""
-    # loads go with the square of the speed
-    speed = next((f"the speed, as of {e.actual} taken for {e.stated}" for e in unit_errors.errors("rotation")
-                  if abs(both + 2.0 * math.log(e.factor)) <= NEAR), "speed, sector, density and diameter")  # fmt: skip
-    units = ", then the units" if set(KIND) <= set(units_open) else ""
-    return f" Both loads are off by about a factor of {math.exp(abs(both)):.3g}: first check {speed}{units}."
+    first = f"speed, sector{', density' if open_.density else ''} and diameter"
+    for e in unit_errors.errors("rotation"):
+        if abs(both + 2.0 * math.log(e.factor)) <= NEAR:  # loads go with the square of the speed
+            first = f"the speed, as of {e.actual} taken for {e.stated}"
+            break
+    units = ", then the units" if set(KIND) <= open_.units else ""
+    return f" Both loads are off by about a factor of {math.exp(abs(both)):.3g}: first check {first}{units}."
 
 
 def _not_counted(channel: str, loads: Sequence[BothLoads], elsewhere: Sequence[Elsewhere]) -> str:

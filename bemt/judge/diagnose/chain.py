@@ -102,7 +102,6 @@ def _diagnose(
     if question := other_rotor.finding(problem):
         problem = replace(problem, between=(question, *problem.between))
     problem = following(problem, rotor.problem) if rotor is not None else problem
-    problem = problem.beside(noise.shown(problem))
     # until the reference is asked
     problem = replace(problem, shared=problem.missing, told=frozenset(given.changed))
     candidates, absent = signatures.candidates(problem, only, lambda name: say(f"solving with {name}"))

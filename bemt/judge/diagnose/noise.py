@@ -157,7 +157,8 @@ def discrepancy(problem: Problem) -> Array:
     kernel *= 1.0 - _MODEL_RPM + _MODEL_RPM * smooth((n, _LENGTH_RPM))
     same = alike(problem.channel, problem.rotor)
     load = (problem.channel < 2)[:, None] & (problem.channel < 2)[None, :]
-    return np.asarray(np.where(same & load, kernel, 0.0) * problem.scale[:, None] * problem.scale[None, :])
+    size = np.copysign(problem.scale, problem.stretch)
+    return np.asarray(np.where(same & load, kernel, 0.0) * size[:, None] * size[None, :])
 
 
 def sessions(problem: Problem) -> Array:
@@ -192,24 +193,6 @@ def covariances(problem: Problem) -> Iterator[tuple[Hyper, Array]]:
     for h in hypers(problem):
         C = h.scale**2 * by_ar[h.ar] + h.session**2 * apart + stand + h.own**2 * own + h.model**2 * wrong
         yield h, C + h.real**2 * problem.of_real_rotors if h.real > 0.0 else C
-
-
-def shown(problem: Problem) -> Array:
-    """What readings are expected to be beyond the baseline, as those of the references show, (M,); 0 without any.
-
-    Under the widest error of the solver: how good it is does not matter where the rotor itself was measured. What is
-    read in another unit has its errors in that unit already.
-    """
-    out, free = np.zeros(problem.y.size), problem.free & (problem.channel < 2) & (problem.stretch == 1.0)
-    known = ~problem.free & (problem.channel < 2)
-    if known.any() and free.any():
-        widest = max(hypers(problem), key=lambda h: (h.model, -abs(h.scale - 1.0), -h.ar, h.session))
-        C = covariance(problem, widest)
-        expected = C[np.ix_(free, known)] @ whitener(C[np.ix_(known, known)], problem.u[known]).solve(
-            problem.residual[known]
-        )
-        out[free] = expected - problem.offset[free]
-    return out
 
 
 def _tangents(problem: Problem) -> tuple[Array, Array]:

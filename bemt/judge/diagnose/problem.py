@@ -77,9 +77,6 @@ class Part:
     instead: Array | None = None
     # Speed over pulse width as the reference shows it; None: as this recording itself does
     drive: SpeedCurve | None = None
-    # Loads beyond the baseline by channel, (P,) each, as a reference shows them: they go with dynamic pressure, and
-    # cells read them, too; None: nothing is shown [N], [N m], 0 of a speed
-    beyond: tuple[Array, ...] | None = None
     _solved: dict[tuple[Effect, ...], tuple[Array, Array, Flow]] = field(default_factory=dict, repr=False)
 
     @cached_property
@@ -110,14 +107,10 @@ class Part:
         values = {"thrust_N": T.copy(), "torque_Nm": Q.copy()}
         if "rpm" in self.record.measured:
             values["rpm"] = self.steady_rpm.copy()
-        more = dict(zip(self.channels, self.beyond or (), strict=False))
-        pressure = met.rho * met.rpm**2 / (self.flow.rho * self.flow.rpm**2)  # coefficients stay
-        for c, of_c in more.items():
-            values[c] = values[c] + of_c * pressure
         reading = Reading(values, self.full_scale)
         for e in effects:
             e.reading(reading, met)
-        return np.concatenate([reading.values[c] - more.get(c, 0.0) for c in self.channels])
+        return np.concatenate([reading.values[c] for c in self.channels])
 
     def _respond(self, effects: Sequence[Effect]) -> tuple[Array, Array, Flow]:
         """Thrust [N] and torque [N m] with a set of effects, NaN where not converged, and the flow that is met."""
@@ -251,14 +244,18 @@ class Problem:
 
     @cached_property
     def stretch(self) -> Array:
-        """Readings over the baseline for channels in other units, else 1, (M,): errors are shares of what is read."""
+        """Readings over the baseline for channels in another unit or of the other sign, else 1, (M,).
+
+        Errors are shares of what is read.
+        """
         out = np.ones_like(self.y)
         for k in np.unique(self.part):
             for c in np.unique(self.channel):
                 mine = (self.part == k) & (self.channel == c)
                 if mine.any():
-                    ratio = float(np.median(np.abs(self.y[mine]) / np.maximum(np.abs(self.f0[mine]), 1e-12)))
-                    out[mine] = 1.0 if 1.0 / _SLIPPED < ratio < _SLIPPED else ratio
+                    size = float(np.median(np.abs(self.y[mine]) / np.maximum(np.abs(self.f0[mine]), 1e-12)))
+                    turned = float(np.median(np.sign(self.y[mine]) * np.sign(self.f0[mine]))) < 0.0
+                    out[mine] = (1.0 if 1.0 / _SLIPPED < size < _SLIPPED else size) * (-1.0 if turned else 1.0)
         return out
 
     @property
@@ -324,17 +321,6 @@ class Problem:
                 full.append(p.predict((*(e for e in p.baseline if e.id not in ids), *mine)))
             self.predicted[key] = np.concatenate(full)[self.kept]
         return self.predicted[key]
-
-    def beside(self, beyond: Array) -> Problem:
-        """The same, of rotors that give so much beyond the baseline, (M,): an instrument's error is of all it reads."""
-        full = np.zeros(self.kept.size)
-        full[self.kept] = beyond
-        ends = np.cumsum([len(p.channels) * len(p.record) for p in self.parts])
-        parts = (
-            replace(p, beyond=tuple(b.reshape(-1, len(p.record))) if p.instead is None else None)
-            for p, b in zip(self.parts, np.split(full, ends[:-1]), strict=True)
-        )
-        return replace(self, parts=tuple(parts), predicted={})
 
     def directions(self, effect: Effect) -> Array:
         """What the signature of an effect is off by in each of the other laws, (M, D) [units of the readings]."""
