@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,7 +19,9 @@ from bemt.data.readers.uiuc_names import FAMILIES, class_of, family_of
 from bemt.rotors.conditioning import SESSION, ReferenceRun, apart, noise_of_run
 from bemt.rotors.latents import NAMES, Prior, Sensed
 from bemt.rotors.population import population
-from geometry.designation import Designation
+
+if TYPE_CHECKING:
+    from geometry.designation import Designation
 
 DATABASE = "UIUC Propeller Database"
 _CLOSE_IN = 0.011  # labels state hundredths of an inch
@@ -73,6 +75,8 @@ class MeasuredRotor:
     @property
     def designation(self) -> Designation:
         """The label, read."""
+        from geometry.designation import Designation
+
         return Designation(
             self.diameter_in, self.pitch_in, self.blades, class_of(self.family), FAMILIES.get(self.family, self.family)
         )

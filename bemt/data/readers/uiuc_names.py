@@ -30,7 +30,6 @@ import re
 from dataclasses import dataclass
 
 from bemt.base.errors import Fault, InputError
-from geometry.designation import blade_class
 
 MM_ABOVE = 40.0
 """A diameter in a name above this is in millimetres: the archive's largest propeller has 21 in, the smallest 45 mm."""
@@ -117,6 +116,8 @@ def class_of(family: str | None) -> str | None:
     >>> class_of("gwssf"), class_of("ancf"), class_of("grcsp")
     ('slow_flyer', 'folding', None)
     """
+    from geometry.designation import blade_class
+
     return blade_class(FAMILIES.get((family or "").lower(), ""))
 
 
