@@ -778,7 +778,7 @@ def test_a_unit_is_named_only_where_it_was_open_and_fits_every_point() -> None:
 def test_loads_that_are_off_by_one_factor_are_no_unit_of_one_of_them() -> None:
     """PPTC beside a case of another size, a full model told to be one of seven sectors, rad/s given as rev/min."""
     both = frozenset({"thrust_N", "torque_Nm"})
-    for thrust, torque, words in ((4.448, 4.3, "diameter"), (7.1, 6.8, "sector"), (1 / 4.4, 1 / 4.6, "density"),
+    for thrust, torque, words in ((4.448, 4.3, "diameter"), (7.1, 6.8, "sector"), (1 / 4.4, 1 / 4.6, "diameter"),
                                   (88.0, 93.0, "rad/s taken for rev/min")):  # fmt: skip
         for units_open in (both, frozenset[str]()):
             told = _told({"thrust_N": [thrust] * 2, "torque_Nm": [torque] * 2}, units_open)
