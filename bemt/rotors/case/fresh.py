@@ -296,7 +296,7 @@ def _as_built(known: MeasuredRotor | None, reading: str | None) -> str:
 
 def _label_name(told: Designation) -> str:
     kind = f"_{told.blade_class}" if told.blade_class else ""
-    return case_name(f"prop_{told.size}{kind}")
+    return case_name(f"{_OWN}_{told.size}{kind}")
 
 
 def _title(told: Designation) -> str:
@@ -426,8 +426,9 @@ def of_stations(file: Path, diameter_m: float) -> tuple[float, str, BladeStation
     return max(float(found.r_R.min()), 0.05), key, found
 
 
-_MAKERS = {"t", "q", *FAMILIES, *(word.casefold() for name in FAMILIES.values() for word in name.split())} - {"prop"}
-"""Words of labels; the one that names of new cases begin with is none."""
+_OWN = "prop"
+"""What names of new cases begin with; no word of a label."""
+_MAKERS = {"t", "q", *FAMILIES, *(word.casefold() for name in FAMILIES.values() for word in name.split())} - {_OWN}
 _LABEL = re.compile(r"\d\s*[xX\u00d7*]\s*\d")
 
 
