@@ -366,9 +366,13 @@ class Flow:
 
         v = sqrt(V^2/4 + T/(2 rho A)) - V/2 (Glauert 1935, eq. VII 2.3), zero unless the thrust is positive.
         """
-        load = np.maximum(self.T0, 0.0) / (2.0 * self.rho * self.area)
-        half = 0.5 * np.abs(self.V)
-        return np.asarray(np.sqrt(half**2 + load) - half)
+        return induced_speed(self.T0, self.V, self.rho * self.area)
+
+
+def induced_speed(T: Array, V: Array, rho_A: Array) -> Array:
+    """Induced speed of a thrust [N] in an onset speed [m/s] by momentum theory, zero unless T is positive [m/s]."""
+    half = 0.5 * np.abs(V)
+    return np.asarray(np.sqrt(half**2 + np.maximum(T, 0.0) / (2.0 * rho_A)) - half)
 
 
 @dataclass
