@@ -112,8 +112,9 @@ def test_a_reference_finds_the_blade_whatever_the_case_says_of_it(off: float) ->
     np.testing.assert_allclose(problem.f0[mine], exact, atol=0.02 * exact.max())
     answer = chain.diagnose(records, [guess])
     assert answer.decision.effects == ("ground_effect",), answer.decision
-    # as much as the runs differ, whatever of the reference the blade leaves over
-    ratio = changed.values["thrust_N"] / plain.values["thrust_N"]
+    # as much as the runs differ where the wall shows, whatever of the reference the blade leaves over
+    slow = given["airspeed_m_s"] / (given["rpm"] / 60.0 * 2.0 * problem.parts[0].flow.R) <= answer.where.high
+    ratio = (changed.values["thrust_N"] / plain.values["thrust_N"])[slow]
     assert answer.where.channel == "thrust_N" and answer.where.ratio == pytest.approx(np.median(ratio) - 1.0, abs=0.02)
 
 
@@ -246,6 +247,6 @@ def test_what_changes_with_the_distance_of_a_wall_that_is_on_is_that_wall() -> N
     problem = before_a_wall()
     others = [e for e in problem.baseline if e.id != "ground_effect"]
     change = problem.parts[0].predict([*others, Tube()])[problem.kept] - problem.f0
-    C = problem.tangents @ problem.tangents.T + np.diag((5e-4 * problem.scale) ** 2)
-    assert np.max(np.abs(change) / problem.scale) > 0.007
-    assert change @ np.linalg.solve(C, change) < 20.0  # 39 if the law errs by a share that does not vary with distance
+    C = problem.tangents @ problem.tangents.T + np.diag((8e-4 * problem.scale) ** 2)
+    assert np.max(np.abs(change) / problem.scale) > 0.014
+    assert change @ np.linalg.solve(C, change) < 20.0  # 28 if the law errs by a share that does not vary with distance

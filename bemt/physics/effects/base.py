@@ -362,15 +362,23 @@ class Flow:
 
     @property
     def induced(self) -> Array:
-        """Induced speed of the baseline's thrust by momentum theory of the open disk, (P,) [m/s].
-
-        v = sqrt(V^2/4 + T/(2 rho A)) - V/2 (Glauert 1935, eq. VII 2.3), zero unless the thrust is positive.
-        """
+        """Induced speed of the baseline's thrust by momentum theory, (P,) [m/s]."""
         return induced_speed(self.T0, self.V, self.rho * self.area)
 
 
 def induced_speed(T: Array, V: Array, rho_A: Array) -> Array:
-    """Induced speed of a thrust [N] in an onset speed [m/s] by momentum theory, zero unless T is positive [m/s]."""
+    """Induced speed of a thrust by momentum theory of the open disk.
+
+    Parameters
+    ----------
+    T, V, rho_A : (P,) float
+        Thrust [N], axial onset speed [m/s], density times disk area [kg/m].
+
+    Returns
+    -------
+    (P,) float
+        v = sqrt(V^2/4 + T/(2 rho A)) - V/2 (Glauert 1935, eq. VII 2.3), zero unless the thrust is positive [m/s].
+    """
     half = 0.5 * np.abs(V)
     return np.asarray(np.sqrt(half**2 + np.maximum(T, 0.0) / (2.0 * rho_A)) - half)
 
