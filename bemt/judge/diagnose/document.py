@@ -261,7 +261,9 @@ def _with_cause(d: Diagnosis) -> list[str]:
         words = [f"{named}: {told}." if told else f"{named}.", *([f"Signature: {signs}."] if signs else [])]
     elif said.verdict == "class":
         lead = "One of these" if len(said.sets) < 2 else f"{said.why[0].upper()}{said.why[1:]}"
-        words = [f"{lead} ({said.probability:.2f}): {', '.join(_title(d, i) for i in said.effects)}."]
+        one_cause = len(said.sets) < 2
+        listed = [_both(d, k) for k in _ways(d)] if one_cause else [_title(d, i) for i in said.effects]
+        words = [f"{lead} ({said.probability:.2f}): {', '.join(listed)}."]
     elif said.verdict == "unknown":
         words = [f"The cause is not in the library: {said.why}. It shows in {d.found.states[0].best_rival}."]
     else:
@@ -355,11 +357,27 @@ def _of_class(d: Diagnosis) -> str:
         return f"Two causes: {' and '.join(f'one of ({w})' if ' / ' in w else w for w in each)}"
     if len(titles) > _A_GROUP:
         return f"{len(titles)} causes look alike in these readings: {families(said.effects)}"
-    chance, lead = d.found.probability.get(said.leading, 0.0), [i for i in said.leading if i in said.effects]
-    if len(lead) == 1:  # the likeliest, with its size
-        others = (_title(d, i) for i in said.effects if i not in lead)
-        titles = [f"{_with_size(d, lead[0])}, probability {chance:.2f},", *others]
-    return f"The cause is {' or '.join(titles)}; these readings cannot distinguish them"
+    first, *others = _ways(d)
+    lead = _both(d, first)
+    if not first.pair:  # the likeliest, with its size
+        lead = f"{_with_size(d, next(iter(first)))}, probability {d.found.probability.get(first, 0.0):.2f},"
+    return f"The cause is {' or '.join([lead, *(_both(d, k) for k in others)])}; these readings cannot distinguish them"
+
+
+def _ways(d: Diagnosis) -> list[Explanation]:
+    """Likeliest explanations that a class stands for, until each of its members is in one."""
+    inside = {k: p for k, p in d.found.probability.items() if k.ids and k.ids <= {*d.said.effects}}
+    ways: list[Explanation] = []
+    for k in sorted(inside, key=lambda k: -inside[k]):
+        if not k.ids <= {i for way in ways for i in way}:
+            ways.append(k)
+    seen = {i for way in ways for i in way}
+    return ways + [Explanation.of(i) for i in d.said.effects if i not in seen]  # those of the drive
+
+
+def _both(d: Diagnosis, what: Explanation) -> str:
+    """Titles of the effects that an explanation has at work together."""
+    return " with ".join(_title(d, i) for i in what)
 
 
 def _off(d: Diagnosis) -> str:

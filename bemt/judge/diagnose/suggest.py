@@ -282,7 +282,7 @@ def nothing_called_for(found: Evidence, rivals: Sequence[Rival], unknown: float)
     best = suggest(found, rivals, unknown, reference=True)
     run = next((s for s in (best, best.otherwise) if s and s.kind == "run" and s.gain), None)
     level = max((abs(v) for v in found.problem.level.values()), default=0.0)
-    text = "no further run is needed; with a reference run (the same rotor before the change) weaker causes would show"
+    text = "a reference run (the same rotor before the change): only that shows what the model's uncertainty hides"
     if level > LEVEL:
         text = f"{REFERENCE}; it shows whether the level comes from blade, stand or model"
     return Suggestion(text, "reference", otherwise=run)

@@ -47,3 +47,7 @@ class TorqueZero(Zero):
     title = "zero offset of the torque cell"
     sign = "torque off by a constant, which falls as 1/n^2 in the coefficient, at any airspeed; thrust is right"
     sensor = "torque_Nm"
+    check = (
+        "hang dead weights on the cell before and after a run; if it reads right, a bearing or cable drags: turn the "
+        "motor without its propeller"
+    )
