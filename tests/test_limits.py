@@ -12,6 +12,7 @@ from bemt.base.errors import InputError
 from bemt.physics.air import Air
 from bemt.physics.bem import solver
 from bemt.physics.bem.duct import DuctFlow
+from bemt.physics.cavitation import keller_N
 from bemt.physics.effects import Effect, standard
 from bemt.physics.effects.high_induction import HighInduction
 from bemt.physics.effects.swirl import Swirl
@@ -250,3 +251,15 @@ def test_a_density_between_gas_and_water_is_refused(tmp_path: Path) -> None:
     assert coefficients(tmp_path / "by_density", "density_kg_m3 = 999.1", 300.0) == pytest.approx(
         coefficients(tmp_path / "by_name", 'fluid = "water"', 300.0), rel=1e-3
     )
+
+
+def test_a_blade_in_water_that_wants_more_area_is_said_to_cavitate(tmp_path: Path) -> None:
+    (tmp_path / "case.toml").write_text(CASE.format(air='fluid = "water"'), "utf-8")
+    case = load_case(tmp_path / "case.toml")
+    limit = keller_N(case.rotor())
+    rpm = np.array([300.0, 600.0, 900.0, 1200.0, 1500.0, 1800.0, 3000.0])
+    for wet, made in ((True, case.air()), (False, Air.from_density(1.225))):
+        found = prepare_case(case).solve(rpm, 0.0, made)
+        told = [any("cavitates" in word for word in words) for words in found.flags]
+        assert told == [wet and bool(T > limit) for T in found.thrust_N]
+        assert not wet or set(told) == {True, False}

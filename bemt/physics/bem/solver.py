@@ -22,6 +22,7 @@ from bemt.physics.bem import kernel as K
 from bemt.physics.bem import packing as arrays
 from bemt.physics.bem import residual as res
 from bemt.physics.bem.packing import M2_STEP
+from bemt.physics.cavitation import WET, keller_N
 from bemt.physics.effects import Effect, standard
 from bemt.physics.effects.base import RotorBuild
 from bemt.physics.sections.polars import ALPHA_GRID
@@ -447,8 +448,12 @@ def _flags(prep: Prepared, points: Array, out: Array, ok: NDArray[np.bool_]) -> 
     status = np.where(ok | (out[:, K.O_STATUS] > 0), out[:, K.O_STATUS], K.NOT_FINITE)
     counts = [out[:, i] for i in (K.O_BRIDGED, K.O_STAGNANT, K.O_REVERSED)]
     columns = [status, np.where(ok, -1.0, out[:, K.O_WHERE]) + 1.0, *counts, mach > prep.mach_top, behind]
+    wet, cavitates = points[:, K.P_RHO] > WET, np.zeros(n, dtype=bool)
+    if wet.any():
+        cavitates = wet & (out[:, K.O_T] > keller_N(prep.rotor))
+    columns.append(cavitates)
     backwards = behind if prep.duct is not None else np.zeros(n, dtype=bool)
-    loud = np.flatnonzero(~ok | (mach > prep.mach_top) | backwards | (np.sum(counts, axis=0) > 0))
+    loud = np.flatnonzero(~ok | (mach > prep.mach_top) | backwards | cavitates | (np.sum(counts, axis=0) > 0))
     flags: list[tuple[str, ...]] = [()] * n
     if loud.size == 0:
         return tuple(flags)
@@ -464,7 +469,15 @@ def _flags(prep: Prepared, points: Array, out: Array, ok: NDArray[np.bool_]) -> 
 
 
 def _words(
-    prep: Prepared, status: int, where: int, bridged: int, stagnant: int, reversed_: int, fast: int, behind: int
+    prep: Prepared,
+    status: int,
+    where: int,
+    bridged: int,
+    stagnant: int,
+    reversed_: int,
+    fast: int,
+    behind: int,
+    cavitates: int,
 ) -> tuple[str, ...]:
     words: list[str] = []
     n = prep.st.shape[0]
@@ -482,6 +495,10 @@ def _words(
         words.append("onset flow from behind the duct: exit and lip losses are not known in that direction")
     if fast:
         words.append(f"helical tip Mach above {prep.mach_top:.2f}: section tables held at their last Mach number")
+    if cavitates:
+        words.append(
+            f"cavitates at a depth of 1 m: blades of this area take {keller_N(prep.rotor):.3g} N (Keller 1966)"
+        )
     return tuple(words)
 
 

@@ -15,6 +15,7 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
 from bemt.physics.air import Air
+from bemt.physics.cavitation import WET, keller_N
 from bemt.rotors.case import Case, case_of, fresh
 from bemt.rotors.case.lattice import SPEEDS
 from bemt.rotors.case.load import with_changes
@@ -134,25 +135,8 @@ def loads_of_case(
     fine = np.linspace(n[0], n[-1], FINE)
     thrust, torque = (pchip(n, v[good] / n**2, fine) * fine**2 for v in (T, Q))
     pitch, blades = case.stated_pitch_m, int(case.file.rotor.blades)
-    keller = _keller_N(case) if float(air.rho) > WET else math.inf
+    keller = keller_N(case.rotor()) if float(air.rho) > WET else math.inf
     return RotorLoads(label, case.diameter_m, pitch, blades, fine, thrust, torque, float(air.a_sound), keller)
-
-
-WET = 500.0  # [kg/m3]
-ROOM_PA = 101_325.0 + 9_800.0 - 1_700.0
-"""Pressure at a depth of 1 m over that of vapour at 15 C [Pa]."""
-
-
-def _keller_N(case: Case) -> float:
-    """Largest thrust of the blade area: A_E/A_0 >= (1.3 + 0.3 Z) T / ((p - p_v) D^2) + K.
-
-    J. auf'm Keller, "Enige aspecten bij het ontwerpen van scheepsschroeven", Schip en Werf 24 (1966); K = 0, for a
-    screw without a hull before it, as in textbooks (not checked).
-    """
-    s = case.rotor().blade.midpoints(60)
-    D, B = case.diameter_m, int(case.file.rotor.blades)
-    ratio = B * float(np.sum(s.chord * s.dr)) / (0.25 * math.pi * D**2)
-    return ratio * ROOM_PA * D**2 / (1.3 + 0.3 * B)
 
 
 def scatter(label: str, rpm: float, airspeed_m_s: float, use: Use = ALONE) -> LoadScatter:
