@@ -350,6 +350,21 @@ def test_pole_pairs_that_are_the_next_winding_are_named_by_their_ratio(tmp_path:
         assert first["effect"] == "rpm_scale" and first["probability"] > 0.8
 
 
+@pytest.mark.parametrize("felt", [True, False])
+def test_a_cell_is_blamed_only_where_the_motor_did_not_feel_the_torque(tmp_path: Path, felt: bool) -> None:
+    """Electrical power knows nothing of a cell: it follows the torque that there was."""
+    files = []
+    for name, seed, more in (("a.csv", 23, 1.0), ("b.csv", 24, 1.14)):
+        table = stand(seed)
+        power = 1.4 * table["torque_Nm"] * table["rpm"] / 9.55 * (more if felt else 1.0)
+        table |= {"torque_Nm": more * table["torque_Nm"], "voltage_V": np.full(17, 12.0), "electrical_power_W": power}
+        files.append(written(tmp_path / name, table))
+    for case in (None, CASES / "prop_10x5"):
+        ranking = compare(*files, case=case).document["subsystems"]["loads"]["ranking"]
+        cell = sum(r["probability"] for r in ranking if {"torque_gain", "cross_talk"} & set(r["effect"].split("+")))
+        assert (cell < 0.5 and ranking[0]["effect"] == "section") if felt else cell > 0.95, ranking
+
+
 def test_stairs_of_few_steps_are_no_ramp(tmp_path: Path) -> None:
     """A lag was allowed for, which took a third of a change that every step shows."""
     rng = np.random.default_rng(5)

@@ -29,6 +29,7 @@ ROOMS: tuple[str, ...] = (
     "base|base.*",
     # physics
     "physics.air",
+    "physics.cavitation",
     "physics.coefficients",
     "physics.vortex_cylinder",
     "physics.wake",

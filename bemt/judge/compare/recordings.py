@@ -142,15 +142,21 @@ class RunChange:
         said = self.loads.parameters.get("rpm_scale")
         return math.log(said["factor"].value * (1.0 + said["eps"].value)) if said else 0.0
 
-    def told_by_drive(self, miscount: float) -> float:
-        """Log odds that speeds of B read exp(``miscount``) times what they are, as the drive takes them [1]."""
+    def told_by_drive(self, miscount: float = 0.0, misread: float = 0.0) -> float:
+        """Log odds that speeds of B read exp(``miscount``) and torques exp(``misread``) times what they are [1].
+
+        The drive takes them as they are: neither its speed at one command nor its electrical power knows of a cell.
+        """
         at = {r.kind: (math.log(r.ratio), math.log(r.high68 / r.low68) / 2.0) for r in self.ratios.values()}
         drive: dict[str, tuple[float, float]] = {k: at[k] for k in ("speed", "electrical") if k in at}
-        if "speed" not in drive:
+        if not drive or (miscount and "speed" not in drive):
             return 0.0
-        volts = at["voltage"][0] if "voltage" in at else None
-        read, right = (log_density_of_ratios(drive, volts, self._load(x)) for x in (miscount, 0.0))
-        return read - right
+        if misread and _unloaded(self.a, self.b, self.diameter_m):
+            return 0.0
+        volts, right = at["voltage"][0] if "voltage" in at else None, self._load(0.0)
+        read = self._load(miscount)
+        read = replace(read, change=read.change - misread)
+        return log_density_of_ratios(drive, volts, read) - log_density_of_ratios(drive, volts, right)
 
     def _load(self, miscount: float) -> Load:
         """How the load of the drive changed; where torque is not recorded, thrust tells it by half."""

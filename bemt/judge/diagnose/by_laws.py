@@ -18,7 +18,7 @@ from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import knowledge, posterior, signatures
 from bemt.judge.diagnose.assemble import assemble
 from bemt.judge.diagnose.law_rotor import BLADE_LAWS, LAWS, VARIANTS, CoefficientCurve, LawRotor, Laws, law_part
-from bemt.judge.diagnose.record import STILL, Record, thinned
+from bemt.judge.diagnose.record import CHANNELS, STILL, Record, thinned
 from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation
 from bemt.physics import effects
 from bemt.physics.air import Air
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from bemt.judge.compare.matched import StandRun
     from bemt.judge.compare.recordings import RunChange
     from bemt.judge.compare.smooth_change import Scatter
-    from bemt.judge.diagnose.problem import Part
+    from bemt.judge.diagnose.problem import Part, Problem
     from bemt.judge.diagnose.signatures import Candidate
     from bemt.physics.dataset import Dataset
 
@@ -125,18 +125,27 @@ def weighed(
     candidates, _ = signatures.candidates(problem, names)
     # what two thermometers leave open of the density counts as repeatability
     thermometers = density_change(pair.a, pair.b)[1]
-    candidates = tuple(as_counted(c, pair) for c in candidates if not (thermometers and c.id == "air_density"))
+    candidates = tuple(as_driven(c, pair, problem) for c in candidates if not (thermometers and c.id == "air_density"))
     return posterior.weigh(problem, knowledge.possible(problem, candidates))
 
 
-def as_counted(candidate: Candidate, pair: RunChange) -> Candidate:
-    """Candidate with the odds of the drive: a motor at one command turns about as fast as before, whatever is read."""
-    if candidate.id not in ("rpm_scale", "unit_slip"):
+def as_driven(candidate: Candidate, pair: RunChange, problem: Problem) -> Candidate:
+    """Candidate with the odds of the drive, which knows neither what a speed is read as nor what a cell reads."""
+    if effects.catalogue()[candidate.id].kind != "stand":
         return candidate
-    read = [abs(s["factor"]) * (1.0 + s.get("eps", 0.0)) if s.get("channel", "rpm") == "rpm" else 1.0
-            for s in candidate.settings]  # fmt: skip
-    told = np.array([max(pair.told_by_drive(math.log(x)), _SHUT) for x in read])
-    return replace(candidate, weight=candidate.weight * np.exp(told))
+    if candidate.id in ("rpm_scale", "unit_slip"):
+        read = [abs(s["factor"]) * (1.0 + s.get("eps", 0.0)) if s.get("channel", "rpm") == "rpm" else 1.0
+                for s in candidate.settings]  # fmt: skip
+        told = [pair.told_by_drive(math.log(x)) for x in read]
+    elif "torque" in {r.kind for r in pair.ratios.values()} and not pair.by_proxy:
+        here = (problem.channel == CHANNELS.index("torque_Nm")) & problem.free & (np.abs(problem.f0) > 0.0)
+        if not here.any():
+            return candidate
+        share = np.median(candidate.signatures[here] / problem.f0[here, None], axis=0)
+        told = [pair.told_by_drive(misread=math.log1p(max(x, -0.95))) if x else 0.0 for x in share.tolist()]
+    else:
+        return candidate
+    return replace(candidate, weight=candidate.weight * np.exp(np.maximum(told, _SHUT)))
 
 
 def records_of(pair: RunChange) -> tuple[Record, Record] | None:

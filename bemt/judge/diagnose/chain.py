@@ -110,7 +110,7 @@ def _diagnose(
     problem, candidates = ask_reference(problem, candidates)
     change = ratios(absent.keys()) if any(p.record.reference for p in problem.parts) else None
     if change is not None:
-        candidates = tuple(by_laws.as_counted(c, change) for c in candidates)
+        candidates = tuple(by_laws.as_driven(c, change, problem) for c in candidates)
     say("weighing explanations")
     found = posterior.weigh(problem, candidates, gone=gone)
     found = replace(found, probability=knowledge.combined(found, change))
