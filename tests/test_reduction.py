@@ -156,6 +156,33 @@ def test_a_speed_of_zero_under_load_is_no_reading() -> None:
     assert np.allclose(got["rpm"][:4], [3000, 5000, 7000, 9000], rtol=2e-3)
 
 
+def test_a_motor_that_stops_under_command_gives_no_points() -> None:
+    """The speed reads 0 at a command that turned it before and no load is left: not a failed sensor."""
+    rpm = np.array([3e3, 4e3, 5e3, 6e3, 7e3, 0.0, 0.0])
+    values = {
+        "pulse_width_s": 1e-3 * np.linspace(1.2, 1.8, 7), "rpm": rpm, "thrust_N": K_T * rpm**2,
+        "torque_Nm": K_Q * rpm**2, "current_A": (rpm / 5e3) ** 3 + 0.02,
+    }  # fmt: skip
+    values["thrust_N"][5:] = 0.1, -0.2
+    got = reduce(imported := recording(values))
+    assert len(got) == 5 and accounted(imported, got)
+    (gone,) = reduction(got).dropped
+    assert list(gone.lines) == [7, 8] and "stopped under command" in gone.reason
+    values["current_A"][5] = 5.0  # it draws what a rotor needs: the sensor failed
+    got = reduce(recording(values))
+    assert len(got) == 6 and any("not a reading" in lost.reason for lost in reduction(got).dropped)
+
+
+def test_small_torques_of_the_other_sign_show_that_the_zero_moved() -> None:
+    rpm = np.array([1e3, 1.2e3, 1.4e3, 4e3, 6e3, 8e3])
+    values = {"rpm": rpm, "thrust_N": K_T * rpm**2, "torque_Nm": -K_Q * rpm**2}
+    assert not any(map(bool, reduce(recording(values)).flags))
+    moved = reduce(recording({**values, "torque_Nm": values["torque_Nm"] + 0.012}))
+    assert [bool(flags) for flags in moved.flags] == [True] * 3 + [False] * 3
+    assert reduction(moved).correlated["torque_Nm"]["zero"] == pytest.approx(0.012 - K_Q * 1e6)
+    assert any("zero of the cell moved" in note for note in moved.notes)
+
+
 def test_runs_of_one_log_are_cut_for_themselves() -> None:
     one, two = log(1), log(2)
     values = {k: np.concatenate([one[k], two[k]]) for k in one}  # the clock starts again

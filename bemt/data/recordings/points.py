@@ -16,7 +16,7 @@ record of samples, or a list of steady points? The rule, in this order:
 
 Rest is where nothing turns: the speed reads 0, or no sensor tells and the command is 0 %, and no more current flows
 than 0.5 % of the largest (1000 us and 0 % are rest by themselves). A speed of 0 while current flows is a sensor that
-failed.
+failed, or a motor that stopped under command: every load is below what it was in all rows that turn.
 """
 
 from __future__ import annotations
@@ -50,6 +50,7 @@ STEADY = 0.02
 IDLE_S = 1.0005e-3
 TARED = ("thrust_N", "duct_thrust_N", "torque_Nm")
 """Channels of load cells."""
+STALLED = "motor stopped under command (lost step or cut off): not a point"
 _SKIP = ("time_s", "run", "electrical_rpm", "optical_rpm")
 _COMMANDS = ("pwm_s", "throttle")
 
@@ -150,6 +151,21 @@ def at_rest(rec: Dataset) -> NDArray[np.bool_]:
     return np.asarray(still & ~quiet)
 
 
+def stalled(rec: Dataset) -> NDArray[np.bool_]:
+    """Rows at which the motor stopped though the command turned it before, (N,).
+
+    The speed reads 0 there, and every load, the current among them, is below that of all rows that turn.
+    """
+    none, speed, command = np.zeros(len(rec), dtype=bool), rec.values.get("rpm"), command_of(rec)
+    loads = [rec.values[k] for k in ("current_A", "electrical_power_W", "thrust_N", "torque_Nm") if k in rec.values]
+    turns = none if speed is None else speed > 0.0
+    if command is None or not turns.any() or not rec.values.keys() & {"current_A", "electrical_power_W"}:
+        return none
+    low = np.all([np.abs(v) < np.fmin.reduce(np.abs(v[turns])) for v in loads], axis=0)
+    before = np.fmin.accumulate(np.where(turns, command[1], np.inf))
+    return np.asarray((speed == 0.0) & low & (command[1] >= before))
+
+
 @dataclass(frozen=True)
 class Rest:
     """Means at rest: `when` (time or row), mean and standard error by channel."""
@@ -182,11 +198,11 @@ class Found:
     notes: list[str] = field(default_factory=list)
 
 
-def _clean(rec: Dataset, rest: NDArray[np.bool_], found: Found) -> dict[str, Array]:
-    """Copies of the channels without readings of a speed sensor that failed."""
+def _clean(rec: Dataset, still: NDArray[np.bool_], found: Found) -> dict[str, Array]:
+    """Copies of the channels without readings of a speed sensor that failed where the rotor does not stand still."""
     data = {name: v for name, v in rec.values.items() if name not in _SKIP}
     if (rpm := data.get("rpm")) is not None:
-        failed = np.flatnonzero((rpm == 0.0) & ~rest)
+        failed = np.flatnonzero((rpm == 0.0) & ~still)
         found.lost += lost(rec, failed, "rpm", "reads 0 while the rotor turns: not a reading")
         slow = np.flatnonzero((np.abs(rpm) < SLOWEST) & (rpm != 0.0))
         for i in slow:
@@ -240,7 +256,8 @@ def from_samples(rec: Dataset, name: str) -> Found:
     found = Found()
     signal = _signal(rec, name)
     rest = at_rest(rec)
-    data = _clean(rec, rest, found)
+    stops = stalled(rec) & ~rest
+    data = _clean(rec, rest | stops, found)
     _spikes(rec, data, found)
     runs, told = runs_of(rec), stated(rec)
     labels, first = np.unique(runs, return_index=True)
@@ -263,6 +280,9 @@ def from_samples(rec: Dataset, name: str) -> Found:
         for p in got.plateaus:
             own_rows = rows[p.start : p.stop]
             middle = 0.5 * (p.t0 + p.t1)
+            if np.mean(stops[own_rows]) > 0.5:
+                found.lost += lost(rec, own_rows, "", STALLED)
+                continue
             if np.mean(rest[own_rows]) > 0.5:
                 still, moving = own_rows[rest[own_rows]], own_rows[~rest[own_rows]]
                 _rest(rec, still, data, middle, run, found)
@@ -316,9 +336,11 @@ def from_rows(rec: Dataset) -> Found:
     """Each row a point."""
     found = Found()
     rest = at_rest(rec)
-    data = _clean(rec, rest, found)
+    stops = stalled(rec) & ~rest
+    found.lost += lost(rec, np.flatnonzero(stops), "", STALLED)
+    data = _clean(rec, rest | stops, found)
     _wild(rec, data, rest, found)
-    gone = _stuck(rec, data, found)
+    gone = _stuck(rec, data, found, stops)
     copied = _copied(data, len(rec)) & ~rest & ~gone
     found.lost += lost(rec, np.flatnonzero(copied), "", "repeats the row before to the last digit")
     time = rec.values.get("time_s")
@@ -350,11 +372,11 @@ def from_rows(rec: Dataset) -> Found:
     return found
 
 
-def _stuck(rec: Dataset, data: dict[str, Array], found: Found) -> NDArray[np.bool_]:
-    """Leave out loads that stick; the rows of an airspeed that does, (N,), are none without it."""
-    gone = np.zeros(len(rec), dtype=bool)
+def _stuck(rec: Dataset, data: dict[str, Array], found: Found, gone: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Leave out loads that stick; the rows of an airspeed that does are none without it: these and `gone`, (N,)."""
+    before, gone = gone, gone.copy()
     for name in (k for k in STICKS if k in rec.values):
-        rows = np.flatnonzero(stuck(name, rec.values))
+        rows = np.flatnonzero(stuck(name, rec.values) & ~before)
         whole = name == "airspeed_m_s"
         reason = f"{name} repeats the row before to the last digit while what moves it changes: stuck?"
         found.lost += lost(rec, rows, "" if whole else name, reason)
