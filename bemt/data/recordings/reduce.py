@@ -258,6 +258,8 @@ def _moved(
     size = np.abs(torque)
     top, part = float(np.fmax.reduce(size)), correlated["torque_Nm"]
     loaded = torque[size > _LOADED * top]
+    if not loaded.size:  # not measured
+        return none
     error = np.hypot(np.nan_to_num(u["torque_Nm"]), part.get("zero", 0.0))
     odd = (torque * np.median(loaded) < 0.0) & (size <= _LOADED * top) & (size > np.fmax(3.0 * error, _FINEST * top))
     if odd.sum() < _FEWEST or np.any(loaded > 0.0) == np.any(loaded < 0.0):
