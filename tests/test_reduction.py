@@ -173,16 +173,6 @@ def test_a_motor_that_stops_under_command_gives_no_points() -> None:
     assert len(got) == 6 and any("not a reading" in lost.reason for lost in reduction(got).dropped)
 
 
-def test_small_torques_of_the_other_sign_show_that_the_zero_moved() -> None:
-    rpm = np.array([1e3, 1.2e3, 1.4e3, 4e3, 6e3, 8e3])
-    values = {"rpm": rpm, "thrust_N": K_T * rpm**2, "torque_Nm": -K_Q * rpm**2}
-    assert not any(map(bool, reduce(recording(values)).flags))
-    moved = reduce(recording({**values, "torque_Nm": values["torque_Nm"] + 0.012}))
-    assert [bool(flags) for flags in moved.flags] == [True] * 3 + [False] * 3
-    assert reduction(moved).correlated["torque_Nm"]["zero"] == pytest.approx(0.012 - K_Q * 1e6)
-    assert any("zero of the cell moved" in note for note in moved.notes)
-
-
 def test_runs_of_one_log_are_cut_for_themselves() -> None:
     one, two = log(1), log(2)
     values = {k: np.concatenate([one[k], two[k]]) for k in one}  # the clock starts again

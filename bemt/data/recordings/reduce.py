@@ -35,7 +35,6 @@ from bemt.data.recordings.channels import (
     shaft_power,
     stated,
 )
-from bemt.data.recordings.findings import zero_thrust_speed
 from bemt.data.recordings.points import (
     TARED,
     Found,
@@ -50,9 +49,6 @@ from bemt.data.recordings.zero import TareZero, from_rest
 from bemt.physics import coefficients as co
 from bemt.physics.air import AIR_C, GAMMA, R_DRY, Air
 from bemt.physics.dataset import Dataset
-
-_LOADED, _FINEST, _FEWEST = 0.2, 0.01, 3
-"""Torque above which a point is under load and below which it has no sign, of the largest; fewest points: declared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,8 +108,6 @@ def reduce(recording: Dataset, *, diameter_m: float | None = None, steady: bool 
             values[key] = np.full(len(found.points), constants[constant])
     correlated = _instrument(recording, rec, values, u)
     _subtract(found, values, correlated, notes)
-    flags = _moved(values, u, correlated, notes)
-    found.points = [replace(p, flags=(*p.flags, *own)) for p, own in zip(found.points, flags, strict=True)]
     surroundings = air_of(values, len(found.points), constants)
     notes += surroundings.notes
     _fill_scatter(found, values, u, correlated, notes)
@@ -240,38 +234,6 @@ def _subtract(
         notes.append("no rows with the motor off: the zero of the load cells is unknown, nothing was subtracted")
     elif bare := sorted(set(runs.tolist()) - found.rests.keys()):
         notes.append(f"runs without a motor stop, nothing subtracted: {', '.join(f'{r:g}' for r in bare)}")
-
-
-def _moved(
-    values: Mapping[str, Array], u: Mapping[str, Array], correlated: dict[str, dict[str, float]], notes: list[str]
-) -> list[tuple[str, ...]]:
-    """Flags of points at rest of the air whose small torque has another sign than the large ones: the zero moved.
-
-    The shared zero becomes as uncertain as the largest of them; what is within its error, or in wind, is none of them.
-    """
-    none: list[tuple[str, ...]] = [() for _ in next(iter(values.values()))]
-    torque, rpm, thrust = (values.get(name) for name in ("torque_Nm", "rpm", "thrust_N"))
-    if torque is None or _flow(values) is not None:
-        return none
-    if rpm is not None and (np.any(rpm < 0.0) or (thrust is not None and zero_thrust_speed(rpm, thrust) is not None)):
-        return none
-    size = np.abs(torque)
-    top, part = float(np.fmax.reduce(size)), correlated["torque_Nm"]
-    loaded = torque[size > _LOADED * top]
-    if not loaded.size:  # not measured
-        return none
-    error = np.hypot(np.nan_to_num(u["torque_Nm"]), part.get("zero", 0.0))
-    odd = (torque * np.median(loaded) < 0.0) & (size <= _LOADED * top) & (size > np.fmax(3.0 * error, _FINEST * top))
-    if odd.sum() < _FEWEST or np.any(loaded > 0.0) == np.any(loaded < 0.0):
-        return none
-    most = float(size[odd].max())
-    part["zero"] = math.hypot(part.get("zero", 0.0), most)
-    notes.append(
-        f"torque_Nm: {odd.sum()} points of low load have the other sign than the rest, up to {most:.3g} Nm "
-        f"({most / top:.1%} of the largest): the zero of the cell moved under load, or thrust acts on it; the zero "
-        "that all points share is taken to be that uncertain"
-    )
-    return [("torque of the other sign",) if own else () for own in odd]
 
 
 def _fill_scatter(
