@@ -91,6 +91,7 @@ MUTANTS = (
     Mutant(f"{E}compressibility.py", "1.0 + self.amplitude * (ratio - 1.0)", "1.0 + (ratio - 1.0)", PHYSICS),
     Mutant(f"{E}compressibility.py", "- 0.1 * np.minimum(np.abs(np.asarray(cl)), 1.2)", "", GUARDS),
     Mutant(f"{E}ground_effect.py", "(1.0 - (0.25 / z) ** 2) ** 1.5", "(1.0 - (0.25 / z) ** 2)", PHYSICS),
+    Mutant(f"{E}ground_effect.py", "v * (V + v) / np.maximum(V + left, 1e-12) - left", "v - left", PHYSICS),
     Mutant(f"{E}ground_effect.py", "np.arctan2(1.0, zeta) - zeta / (1.0 + zeta**2)", "np.arctan2(1.0, zeta)", PHYSICS),
     Mutant(f"{E}nacelle.py", "loads.T - self.cd * 0.5", "loads.T + self.cd * 0.5", PHYSICS),
     Mutant(f"{E}tip_gap.py", "bake.num.gap_loss = min(self.loss * gap", "bake.num.gap_loss = min(gap", GUARDS),

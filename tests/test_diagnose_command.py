@@ -178,6 +178,17 @@ def test_nothing_of_a_file_goes_unmentioned(tmp_path: Path, change: dict[str, ob
     assert any(words in note for note in notes), notes
 
 
+def test_a_zero_that_turns_the_sign_of_low_torques_is_still_a_zero(tmp_path: Path) -> None:
+    """The cell is as certain as it was: its zero is what is looked for."""
+    rpm = np.linspace(2000.0, 11000.0, 30)
+    found, scatter = prepare_case(case()).solve(rpm, 0.0, case().air()), np.random.default_rng(3).normal(1, 0.004, 30)
+    torque = found.torque_Nm * scatter - 0.14 * np.max(found.torque_Nm)
+    assert np.count_nonzero(torque < 0.0) > 3
+    table = {"rpm": rpm, "thrust_N": found.thrust_N * scatter[::-1], "torque_Nm": torque}
+    said = bemt.diagnose(_table(tmp_path / "log.csv", table), case=CASES / "prop_8x5")
+    assert said.effects == ("torque_zero",), said.text
+
+
 @pytest.mark.parametrize("heading", ["v Kanal (m/s)", "flow (m/s)", "Anströmung [m/s]"])
 def test_a_column_that_may_be_the_airspeed_is_asked_about_at_every_door(
     tmp_path: Path, heading: str, capsys: pytest.CaptureFixture[str]

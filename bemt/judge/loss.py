@@ -8,7 +8,7 @@ of least expected loss: Berger 1985, Statistical Decision Theory and Bayesian An
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation
@@ -164,6 +164,22 @@ def _sets(
     # the others are likelier beside it than in its place
     sure = share[first] > _NEARLY_ALL * total and pairs > total - share[first]
     return first, ((first,), rest) if sure else (said,)
+
+
+def ways(said: Collection[str], likeliest: Iterable[Explanation]) -> list[Explanation]:
+    """Explanations that a class stands for, in the order given: two, then those with a member that is in none yet.
+
+    >>> zero, both = Explanation.of("thrust_zero"), Explanation.of("air_density", "section")
+    >>> [str(k) for k in ways(("thrust_zero", "air_density", "section"), [zero, NONE, both, Explanation.of("section")])]
+    ['thrust_zero', 'section+air_density']
+    """
+    out: list[Explanation] = []
+    seen: set[str] = set()
+    for k in (*likeliest, *map(Explanation.of, said)):  # those that none of these has stand alone
+        if k.ids and k.ids <= {*said} and not k.smooth and (not k.ids <= seen or (len(out) == 1 and k not in out)):
+            out.append(k)
+            seen |= k.ids
+    return out
 
 
 def _open(none: float, unknown: float, listed: Mapping[Explanation, float]) -> str:

@@ -29,8 +29,8 @@ from bemt.judge.compare.recordings import (
 )
 from bemt.judge.compare.selection import Invocation
 from bemt.judge.compare.smooth_change import Ratio
-from bemt.judge.explanation import Size
-from bemt.judge.loss import SPREAD, checks_by_worth, minutes
+from bemt.judge.explanation import Explanation, Size
+from bemt.judge.loss import SPREAD, checks_by_worth, minutes, ways
 
 AIR_OF_BOTH = "--air-a TEMPERATURE,PRESSURE --air-b TEMPERATURE,PRESSURE"
 ONE_SETUP = "compute both with one set-up: before that no physics is named"
@@ -422,7 +422,8 @@ def sentence(doc: ComparedRuns) -> str:
     if doc.verdict == "class":
         if len(doc.sets) > 1:  # more than one cause
             return f"{doc.rule}{sure}: {names}."
-        return f"One of these; the data cannot tell them apart{sure}: {names}."
+        listed = ways(doc.effects, (Explanation.of(*r.effect.split("+")) for r in doc.ranking))
+        return f"One of these; the data cannot tell them apart{sure}: {', '.join(title_of(str(k)) for k in listed)}."
     if doc.verdict == "unknown":
         return f"Unknown: {doc.rule}."
     first = [title_of(k) for k in _likely(doc)]

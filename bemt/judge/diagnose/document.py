@@ -19,7 +19,7 @@ from bemt.judge.diagnose.posterior import LEAST
 from bemt.judge.diagnose.record import DROPPED, NO_SPEED, POWER_OPEN
 from bemt.judge.diagnose.suggest import LEVEL
 from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation, Size
-from bemt.judge.loss import CLAIMS
+from bemt.judge.loss import CLAIMS, ways
 from bemt.physics import effects
 from bemt.physics.effects.propeller import AnotherPropeller
 from bemt.rotors.case.fresh import OPEN_ENDINGS
@@ -358,26 +358,23 @@ def _of_class(d: Diagnosis) -> str:
     if len(titles) > _A_GROUP:
         return f"{len(titles)} causes look alike in these readings: {families(said.effects)}"
     first, *others = _ways(d)
-    lead = _both(d, first)
-    if not first.pair:  # the likeliest, with its size
-        lead = f"{_with_size(d, next(iter(first)))}, probability {d.found.probability.get(first, 0.0):.2f},"
-    return f"The cause is {' or '.join([lead, *(_both(d, k) for k in others)])}; these readings cannot distinguish them"
+    lead = _both(d, first) if first.pair else _with_size(d, *first)
+    lead += f", probability {d.found.probability.get(first, 0.0):.2f}"
+    between = ", or " if any(k.pair for k in others) else " or "
+    return (
+        f"The cause is {lead}, or {between.join(_both(d, k) for k in others)}; these readings cannot distinguish them"
+    )
 
 
 def _ways(d: Diagnosis) -> list[Explanation]:
-    """Likeliest explanations that a class stands for, until each of its members is in one."""
-    inside = {k: p for k, p in d.found.probability.items() if k.ids and k.ids <= {*d.said.effects}}
-    ways: list[Explanation] = []
-    for k in sorted(inside, key=lambda k: -inside[k]):
-        if not k.ids <= {i for way in ways for i in way}:
-            ways.append(k)
-    seen = {i for way in ways for i in way}
-    return ways + [Explanation.of(i) for i in d.said.effects if i not in seen]  # those of the drive
+    """What a class stands for, the likeliest first."""
+    P = d.found.probability
+    return ways(d.said.effects, sorted(P, key=lambda k: -P[k]))
 
 
 def _both(d: Diagnosis, what: Explanation) -> str:
     """Titles of the effects that an explanation has at work together."""
-    return " with ".join(_title(d, i) for i in what)
+    return " and ".join(_title(d, i) for i in what)
 
 
 def _off(d: Diagnosis) -> str:

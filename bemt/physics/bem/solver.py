@@ -469,16 +469,9 @@ def _flags(prep: Prepared, points: Array, out: Array, ok: NDArray[np.bool_]) -> 
 
 
 def _words(
-    prep: Prepared,
-    status: int,
-    where: int,
-    bridged: int,
-    stagnant: int,
-    reversed_: int,
-    fast: int,
-    behind: int,
+    prep: Prepared, status: int, where: int, bridged: int, stagnant: int, reversed_: int, fast: int, behind: int,
     cavitates: int,
-) -> tuple[str, ...]:
+) -> tuple[str, ...]:  # fmt: skip
     words: list[str] = []
     n = prep.st.shape[0]
     if status != K.OK:
