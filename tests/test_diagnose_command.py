@@ -13,11 +13,14 @@ import numpy as np
 import pandas as pd
 import pytest
 from diagnosing import CASES, case, points, recording
+from hypothesis import given
+from hypothesis import strategies as st
 
 import bemt
 from bemt.app.cli import main, parsed
 from bemt.base.errors import InputError
 from bemt.judge.diagnose import assemble, chain, document, other_rotor, record, suggest
+from bemt.judge.diagnose.answer import stretches
 from bemt.judge.diagnose.load import load
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case import load_case
@@ -407,6 +410,40 @@ def test_without_an_explanation_the_first_sentence_is_what_the_recording_shows(c
     assert (float(told[2]), float(told[3])) == pytest.approx((0.41, 0.69), abs=0.1)
     where = answer.where
     assert second.startswith("Beyond the uncertainty") == ((where.channel, where.size > 0) != (channel, True))
+
+
+def test_a_channel_low_at_one_end_and_high_at_the_other_is_said_so() -> None:
+    """Loads a fifth above the case, and a torque cell that reads 4 % of its range too little."""
+    series = recording(case(), points("static"), noise=0.003)
+    thrust, torque = 1.2 * series["thrust_N"], 1.2 * series["torque_Nm"]
+    values = {**series.values, "thrust_N": thrust, "torque_Nm": torque - 0.04 * np.max(torque)}
+    answer = chain.diagnose([record.from_series(Dataset("bench", "log", values, dict(series.u)), case())], [case()])
+    assert answer.said.effects == ("torque_zero",) and answer.where.size < 0.0
+    problem = answer.problem
+    mine = problem.channel == 1
+    speed, off = problem.covariates["rpm"][problem.point[mine]], (problem.y / problem.f0)[mine] - 1.0
+    assert off[np.argmin(speed)] < -0.2 and off[np.argmax(speed)] > 0.05
+    slow, fast = answer.where.shown
+    assert slow.size < 0.0 < fast.size and slow.rpm[1] < fast.rpm[0]
+    for s in (slow, fast):
+        there = off[(speed >= s.rpm[0]) & (speed <= s.rpm[1])]
+        assert np.min(there) - 1e-9 <= s.size <= np.max(there) + 1e-9 and np.sign(np.median(there)) == np.sign(s.size)
+    shown, rest = (next(w for w in document.explanation(answer) if w.startswith(k)) for k in ("Torque is", "Beyond"))
+    assert shown.index("low") < shown.index("high") and "low" in rest and "high" not in rest
+
+
+@given(st.lists(st.integers(-3, 3), min_size=1, max_size=30), st.integers(1, 4))
+def test_every_point_is_in_a_stretch_and_no_side_is_left_out(sides: list[int], repeats: int) -> None:
+    x = np.repeat(np.arange(len(sides)) * 100.0 + 2000.0, repeats)
+    off = np.repeat(0.1 * np.array(sides), repeats)
+    found = stretches(x, x, off, np.full(x.size, 1e-3))
+    assert all(any(s.low <= v <= s.high for s in found) for v in x)
+    if len(sides) <= 12:  # each speed is a group of its own
+        told = {np.sign(s.size) for s in found}
+        assert {np.sign(v) for v in off if v} <= told
+        for s in found:
+            there = off[(x >= s.low) & (x <= s.high)]
+            assert np.min(there) <= s.size <= np.max(there)
 
 
 def test_rows_copied_count_once() -> None:

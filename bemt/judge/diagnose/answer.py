@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -57,6 +57,20 @@ def share(v: float) -> str:
 
 
 @dataclass(frozen=True)
+class Stretch:
+    """Part of an interval over which a channel is off to one side."""
+
+    # Ends of the covariate, in its unit, and of the speed [rev/min]
+    low: float
+    high: float
+    rpm: tuple[float, float]
+    # Median there, or the farthest, and True, where most are far nearer [1]; and its standard uncertainty [1]
+    size: float
+    wide: bool
+    u: float
+
+
+@dataclass(frozen=True)
 class Location:
     """An interval of one variable in one channel."""
 
@@ -76,31 +90,55 @@ class Location:
     mismatch: Array = field(
         repr=False, compare=False, default_factory=lambda: np.empty(0)
     )  # (M,) Of every reading, in its unit; what `size` is the mean of
-    rpm: tuple[float, float] = field(default=(float("nan"),) * 2, compare=False)  # Lowest and highest there [rev/min]
+    # What the recording shows there beside the case, like `ratio`, or as a share of the largest value where that is NaN
+    shown: tuple[Stretch, ...] = field(default=(), repr=False, compare=False)
+    # The mismatch there, as a share of the largest value
+    left: tuple[Stretch, ...] = field(default=(), repr=False, compare=False)
 
     def document(self) -> Mapping[str, object]:
         """Plain values for JSON."""
         return {k: (list(v) if isinstance(v, tuple) else v) for k, v in vars(self).items()
-                if k not in ("mismatch", "ratio", "rpm")}  # fmt: skip
+                if k not in ("mismatch", "ratio", "shown", "left")}  # fmt: skip
+
+    @property
+    def one_sided(self) -> bool:
+        """Whether the recording is off to the side of the mismatch all over the interval."""
+        return all((s.size > 0.0) == (self.size > 0.0) for s in self.shown)
 
     def sentence(self, words: Mapping[str, str]) -> str:
-        """Which channel is off by how much and where, with ``words`` for the channels."""
-        name, unit, digits = _VARIABLE.get(self.variable, (self.variable, "", 3))
-        wide = self.high > self.low
-        both = f"{self.low:.{digits}f} to {self.high:.{digits}f}{unit}" if wide else f"{self.low:.{digits}f}{unit}"
-        size, most = self.ratio, ""
-        if not np.isfinite(size) or size * self.size <= 0.0:  # loads near zero have no ratio
-            size, most = self.size, " of its largest value"
-            most += "" if self.variable == "rpm" and wide else " at that speed"
-        error = float(np.hypot(self.size / self.z, self.shared * (1.0 + self.size))) if self.z else float("nan")
-        error = max(abs(error * size / self.size), 1e-3) if self.size else error
-        spread = f" ± {100.0 * error:.1f}" if np.isfinite(error) else ""
-        told = f"{'high' if size > 0 else 'low'} by {100.0 * abs(size):.1f}{spread} %{most}"
-        if not most and not _PERCENT[0] < 1.0 + size < _PERCENT[1]:
-            told = f"{share(size)} of what the case gives"
+        """Which channel of the recording is off by how much and where, with ``words`` for the channels."""
+        return self._told(words, self.shown, not np.isfinite(self.ratio))
+
+    def rest(self, words: Mapping[str, str]) -> str:
+        """The same of the mismatch, which is what an explanation leaves."""
+        return self._told(words, self.left, True)
+
+    def _told(self, words: Mapping[str, str], stretches: Sequence[Stretch], of_largest: bool) -> str:
+        """How far off each stretch is, and where."""
+        most = " of its largest value" if of_largest else ""
+        most += " at that speed" if of_largest and (self.variable != "rpm" or self.high == self.low) else ""
+        by_place: dict[str, list[str]] = {}
+        for s in stretches:
+            error = max(float(np.hypot(s.u, self.shared * (1.0 + s.size))), 1e-3)
+            up = "up to " if s.wide else ""
+            spread = "" if s.wide or not np.isfinite(error) else f" ± {100.0 * error:.1f}"
+            told = f"{'high' if s.size > 0 else 'low'} by {up}{100.0 * abs(s.size):.1f}{spread} %{most}"
+            if not of_largest and not _PERCENT[0] < 1.0 + s.size < _PERCENT[1]:
+                ends = {True: "up to ", False: "down to "}[s.size > 0.0] if s.wide else ""
+                told = f"{ends}{share(s.size)} of what the case gives"
+            by_place.setdefault(self._place(s), []).append(told)
+        name = _VARIABLE.get(self.variable, (self.variable, "", 3))[0]
+        each = [f"{' and '.join(told)}, at {'' if k else f'{name} '}{place}"
+                for k, (place, told) in enumerate(by_place.items())]  # fmt: skip
+        return f"{words[self.channel].capitalize()} is {', '.join(each[:-1])}{', and ' * (len(each) > 1)}{each[-1]}."
+
+    def _place(self, s: Stretch) -> str:
+        """Where a stretch is."""
+        _, unit, digits = _VARIABLE.get(self.variable, (self.variable, "", 3))
+        ends = " to ".join(dict.fromkeys(f"{x:.{digits}f}" for x in (s.low, s.high))) + unit
         if self.variable in ("M_tip", "Re"):
-            both += f" ({' to '.join(dict.fromkeys(f'{n:.0f}' for n in self.rpm))} rev/min)"
-        return f"{words[self.channel].capitalize()} is {told}, at {name} {both}."
+            ends += f" ({' to '.join(dict.fromkeys(f'{n:.0f}' for n in s.rpm))} rev/min)"
+        return ends
 
 
 def mismatch(found: Evidence, best: Fit) -> Array:
@@ -147,12 +185,52 @@ def _largest(found: Evidence, d: Array, natural: tuple[str, ...]) -> Location:
     inside = (x >= low) & (x <= high)
     size = float(np.mean((d / problem.largest)[here][inside]))
     f0 = problem.f0[here][inside]
-    loaded = bool(np.all(np.abs(f0) > _NEAR_ZERO * problem.largest[here][inside]))
+    largest = problem.largest[here][inside]
+    loaded = bool(np.all(np.abs(f0) > _NEAR_ZERO * largest))
     known = (problem.channel == channel) & ~free & (np.abs(problem.f0) > _NEAR_ZERO * problem.largest)
     usual = float(np.median(problem.y[known] / problem.f0[known])) if known.any() else 1.0
-    ratio = float(np.median(problem.y[here][inside] / f0)) / usual - 1.0 if loaded else float("nan")
+    beside = problem.y[here][inside] / usual - f0
+    ratio = float(np.median(beside / f0)) if loaded else float("nan")
     n = problem.covariates["rpm"][problem.point][here][inside]
-    return Location(CHANNELS[int(channel)], name, low, high, size, z, ties, ratio, 0.0, d, (n.min(), n.max()))
+    u = problem.u[here][inside] * found.states[0].hyper.scale
+    shown = stretches(x[inside], n, beside / (f0 if loaded else largest), u / np.abs(f0 if loaded else largest))
+    left = stretches(x[inside], n, d[here][inside] / largest, u / largest)
+    return Location(CHANNELS[int(channel)], name, low, high, size, z, ties, ratio, 0.0, d, shown, left)
+
+
+def stretches(x: Array, rpm: Array, off: Array, u: Array) -> tuple[Stretch, ...]:
+    """Stretches of x over which ``off`` is on one side, in order; both sides over all of x where they alternate."""
+    group = _groups(x)
+    each = [group == g for g in np.unique(group)]
+    middle = np.array([np.median(off[here]) for here in each])
+    noise = np.array([np.median(u[here]) / np.sqrt(here.sum()) for here in each])
+    side = np.where(np.abs(middle) > _SEEN * noise, np.sign(middle), 0.0)
+    # what is on neither side goes with what is before it, and at the start with what comes
+    first = np.flatnonzero(side)[:1]
+    before = np.maximum.accumulate(np.where(side != 0.0, np.arange(side.size), first if first.size else 0))
+    turns = np.diff(side[before]) != 0.0
+    parts = np.split(np.arange(side.size), np.flatnonzero(turns) + 1)
+    everywhere = np.ones(x.size, dtype=bool)
+    if len(parts) > _MOST_STRETCHES:
+        parts = [np.flatnonzero(np.sign(middle) == s) for s in side[before[:1]] * [1.0, -1.0]]
+    out = []
+    for part in parts:
+        here = everywhere if len(parts) == 1 or turns.sum() >= _MOST_STRETCHES else np.isin(group, part)
+        size, wide = _typical(middle[part], 1.0)
+        if not wide:
+            size = float(np.median(off[np.isin(group, part)]))
+        ends = float(x[here].min()), float(x[here].max())
+        of = float(rpm[here].min()), float(rpm[here].max())
+        out.append(Stretch(*ends, of, size, wide, float(np.median(u[here]) / np.sqrt(here.sum()))))
+    return tuple(out)
+
+
+def _typical(off: Array, most: float = 0.9) -> tuple[float, bool]:
+    """Median; or how far this share of them goes at most, and True, where the median says too little [1]."""
+    order = np.argsort(np.abs(off))
+    median, far = float(np.median(off)), float(off[order[int(most * (off.size - 1))]])
+    wide = abs(far) > _FAR and abs(median) < 0.5 * abs(far)
+    return (far if wide else median), wide
 
 
 def _groups(x: Array) -> NDArray[np.intp]:
@@ -195,6 +273,8 @@ def _scan(x: Array, e: Array) -> tuple[float, float, float]:
 
 # Computed loads below this share of the largest have no ratio; departures above it are said where the median is small.
 _NEAR_ZERO, _FAR = 0.1, 0.05
+# Standard uncertainties from which on a side is seen, and stretches that are told one by one.
+_SEEN, _MOST_STRETCHES = 2.0, 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -335,11 +415,7 @@ class Diagnosis:
             here = (p.channel == c) & p.free
             here &= np.abs(p.f0) > _NEAR_ZERO * np.max(np.abs(p.f0), where=here, initial=0.0)
             if here.any():
-                change = p.y[here] / p.f0[here] - 1.0
-                order = np.argsort(np.abs(change))
-                median, far = float(np.median(change)), float(change[order[int(0.9 * (change.size - 1))]])
-                wide = abs(far) > _FAR and abs(median) < 0.5 * abs(far)
-                out[name] = (far if wide else median), wide
+                out[name] = _typical(p.y[here] / p.f0[here] - 1.0)
         return out
 
     @property

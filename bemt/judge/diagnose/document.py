@@ -84,16 +84,16 @@ def document(d: Diagnosis) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _unexplained(d: Diagnosis) -> list[str]:
+def _located(d: Diagnosis, claimed: bool) -> list[str]:
     """What the recording shows, and, where it is another thing, what calibration would leave of it.
 
-    The location of the document is what remains in the light of the likeliest explanation. Where none is given, its
-    sign and even its channel may be those of something that the recording does not show.
+    The location of the document is what remains in the light of the likeliest explanation. Its sign, and where none is
+    given even its channel, may be those of something that the recording does not show.
     """
-    seen, rest = bare(d.found), d.where
+    seen, rest = d.where if claimed else bare(d.found), d.where
     lines = [seen.sentence(d.words)]
-    if (seen.channel, seen.size > 0) != (rest.channel, rest.size > 0):
-        words = rest.sentence(d.words)
+    if not seen.one_sided or (seen.channel, seen.size > 0) != (rest.channel, rest.size > 0):
+        words = rest.rest(d.words)
         lines.append(f"Beyond the uncertainty of gains, blade angle and solver: {words[0].lower()}{words[1:]}")
     return lines
 
@@ -269,7 +269,7 @@ def _with_cause(d: Diagnosis) -> list[str]:
     else:
         words = [f"No name is given: {said.why}."]
     claimed = said.verdict not in ("unknown", "insufficient") or other_rotor.doubted(d.problem, said)
-    return [*([d.where.sentence(d.words)] if claimed else _unexplained(d)), *words]
+    return [*_located(d, claimed), *words]
 
 
 def _of_loads(d: Diagnosis) -> list[str]:
