@@ -18,6 +18,7 @@ from bemt.base import units
 from bemt.base.errors import InputError
 from bemt.data.recordings.check import Finding, check
 from bemt.data.recordings.load import import_file
+from bemt.judge.diagnose import other_rotor
 from bemt.physics.dataset import Dataset
 
 INCH = units.INCH
@@ -298,6 +299,25 @@ def test_power_above_the_electrical_input() -> None:
     values["current_A"][12] *= 0.5
     (finding,) = check(recording(values), diameter_m=10 * INCH)
     assert (finding.id, finding.rows) == ("power_above_input", (12,))
+
+
+@pytest.mark.parametrize("gain", [0.6, 1.0])
+def test_a_current_that_is_low_at_part_throttle_is_left_out_and_the_loads_go_on(gain: float, tmp_path: Path) -> None:
+    """Where a gain is wrong as well as where it is not; a gain alone is not known to be the current's."""
+    values = stand(rows=20)
+    only = check(recording(values | {"current_A": 0.6 * values["current_A"]}))
+    assert [f.channel for f in said(only, "power_above_input")] == ["torque x speed"]
+    chopped = 1.0 - 0.5 * np.sin(math.pi * np.linspace(0.0, 1.0, 20)) ** 2
+    values["current_A"] = gain * chopped * values["current_A"]
+    (finding,) = said(check(recording(values)), "power_above_input")
+    assert finding.channel == "current_A" and finding.severity == "error"
+    file = tmp_path / "log.csv"
+    text = [",".join(values), *(",".join(f"{v:.8g}" for v in row) for row in zip(*values.values(), strict=True))]
+    file.write_text("\n".join(text) + "\n")
+    answer = bemt.diagnose(file, "10x5", only=["thrust_gain"]).diagnosis
+    (part,) = answer.problem.parts
+    assert not {"current_A", "electrical_power_W"} & part.record.extra.keys() and "voltage_V" in part.record.extra
+    assert not other_rotor.impossible(answer.problem) and answer.next.kind != "mend"
 
 
 def test_a_figure_of_merit_above_one_with_the_limit_of_a_duct() -> None:

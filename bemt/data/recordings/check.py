@@ -17,7 +17,7 @@ from bemt.data.recordings.channels import file_name, named
 from bemt.data.recordings.findings import CHECKS, SEVERITIES, Finding, facts_of
 from bemt.physics.dataset import Dataset
 
-__all__ = ["Finding", "check", "left_out"]
+__all__ = ["Finding", "check", "left_out", "without_current"]
 
 _ROOMS = (slips, columns, limits)
 LEFT_OUT = ("misread", "stuck_sensor")
@@ -60,3 +60,25 @@ def left_out(source: Dataset, findings: Sequence[Finding]) -> Dataset:
             keep[list(f.rows)] &= f.channel != airspeed
     found = replace(source, values=values)
     return found if keep.all() else found.select(keep)
+
+
+def without_current(source: Dataset, findings: Sequence[Finding]) -> tuple[Dataset, tuple[Finding, ...]]:
+    """The recording without a current that cannot be right where a torque is there, and what that makes of its errors.
+
+    Thrust, torque and speed stand without it, so that the error is a warning then.
+
+    >>> made = Dataset("bench", "table", {"rpm": [4e3], "torque_Nm": [0.1], "voltage_V": [12.0], "current_A": [9.0]})
+    >>> left, (wrong,) = without_current(made, [Finding("power_above_input", "current_A", "", "", (0,))])
+    >>> sorted(left.values), wrong.severity
+    (['rpm', 'torque_Nm', 'voltage_V'], 'warning')
+    """
+    known = named(source)
+    own = file_name(known, "current_A")
+    wrong = [f for f in findings if f.severity == "error" and f.channel == own]
+    if not wrong or "torque_Nm" not in known.values:
+        return source, tuple(findings)
+    gone = {own, file_name(known, "electrical_power_W")}
+    values = {k: v for k, v in source.values.items() if k not in gone}
+    mended = "it is left out here: thrust, torque and speed do not need it"
+    found = tuple(replace(f, severity="warning", correction=mended) if f in wrong else f for f in findings)
+    return replace(source, values=values, u={k: v for k, v in source.u.items() if k in values}, u_by={}), found

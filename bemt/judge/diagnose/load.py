@@ -17,7 +17,7 @@ from bemt.base.errors import Fault, InputError, gathered, refuse
 from bemt.base.packed import part_of
 from bemt.base.units import ZERO_CELSIUS
 from bemt.data.recordings.channels import file_name, named, stated
-from bemt.data.recordings.check import check, left_out
+from bemt.data.recordings.check import check, left_out, without_current
 from bemt.judge.compare.selection import one_rotor, speed_in_doubt, wind_of
 from bemt.judge.diagnose import record as records
 from bemt.physics import effects
@@ -94,6 +94,7 @@ def load(
     ducted = case.ducted
     rho = float(case.air().rho)
     findings = check(imported, diameter_m=case.diameter_m, ducted=ducted, density_kg_m3=rho)
+    imported, findings = without_current(imported, findings)
     found = tuple(f"{Path(path).name}: {f}" for f in findings if f.severity != "note")
     imported = left_out(imported, findings)
     rows = named(imported)
