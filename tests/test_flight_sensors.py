@@ -12,6 +12,7 @@ import pytest
 from flight_files import Hover, dataflash, ulog
 
 from bemt.base.errors import InputError
+from bemt.base.units import G0
 from bemt.tools.flight.actions import fly
 from bemt.tools.flight.answer import answer_on
 from bemt.tools.flight.balance import DAY, SESSION, at_equal_voltage, axes_of, features, healthy_flight
@@ -24,6 +25,7 @@ from bemt.tools.flight.repeat import sessions
 from bemt.tools.flight.speed_sensor import checked
 from bemt.tools.flight.text import pilot
 from bemt.tools.flight.thrust_curve import thrust_curve
+from bemt.tools.flight.vibration import Vibration
 
 
 def hover(layout: str = "quad-x", **more: object) -> FlightLog:
@@ -268,7 +270,19 @@ def test_recorded_logs_without_motors(shared_data: Path) -> None:
     cut = fly(folder / "udesa_quad_cut_15mm_one_blade_log13.ulg.gz").flights[0]
     assert cut.log.rotors == 4 and cut.log.mixed and cut.log.file.endswith(".gz")
     assert 80.0 < cut.vibration.line_hz < 95.0 and cut.vibration.line > 10.0
+    assert cut.vibration.high and pilot(cut)[0].startswith("Do not fly") and "29 m/s2" in pilot(cut)[1]
+    assert not octo.flights[0].vibration.high and not pilot(octo.flights[0])[0].startswith("Do not fly")
     assert 0.01 < cut.demand[2] < 0.06, "trim in yaw, without the seconds in which it spins"
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_a_level_is_compared_in_the_measure_that_its_limit_is_for(stated: bool) -> None:
+    """VIBE of one axis; of accelerations the peaks of z, from a weight upwards, and of x or y, from nothing."""
+    shake = Vibration(rms=(1.0, 2.0, 4.0), stated=stated, rate_hz=200.0)
+    most = 30.0 / 4.0 if stated else G0 / (np.sqrt(2.0) * 6.0)
+    for k, high in ((0.99, False), (1.01, True)):
+        assert replace(shake, rms=tuple(k * most * v for v in shake.rms)).high is high
+        assert not replace(shake, rms=tuple(k * most * v for v in shake.rms), unit="rad/s").high
 
 
 @pytest.mark.parametrize("expo", [0.0, 0.4, 0.7])

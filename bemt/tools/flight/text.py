@@ -14,11 +14,10 @@ from bemt.tools.flight.change import FlightEvidence
 from bemt.tools.flight.identify import Constant
 from bemt.tools.flight.judge import FlightVerdict
 from bemt.tools.flight.log import SpeedSensor
-from bemt.tools.flight.vibration import Vibration
+from bemt.tools.flight.vibration import STATED_MOST, Vibration
 
 _OFTEN = 0.005  # share of the time at full command that is worth a word [1]
 _WORDS = {WIDE: "another spread between flights than usual"}
-_HIGH = 30.0  # vibration up to which an autopilot does well (ArduPilot, Measuring Vibration; not checked) [m/s2]
 
 
 def text(a: FlightAnswer, details: bool = False) -> str:
@@ -89,7 +88,8 @@ def _constants(a: FlightAnswer) -> list[str]:
 
 def pilot(a: FlightAnswer) -> list[str]:
     """Where to look, what else is certain or how small a damage would show, and the next step."""
-    return [_look(a), _second(a), f"Next: {a.judged.next.text or 'nothing'}."]
+    no = "Do not fly it as it is: it shakes more than an autopilot can take. " if a.vibration.high else ""
+    return [f"{no}{_look(a)}", _second(a), f"Next: {a.judged.next.text or 'nothing'}."]
 
 
 def _second(a: FlightAnswer) -> str:
@@ -97,6 +97,8 @@ def _second(a: FlightAnswer) -> str:
     j, log, level = a.judged, a.log, _level(a.vibration)
     if log.sensors:
         return " ".join(f"{sensor_text(s)}: look at the sensor. Its readings were repaired." for s in log.sensors)
+    if a.vibration.high:
+        return level
     if not log.rotors:
         return level or "Nothing else in it tells of the motors."
     if j.said.verdict == "none" and np.isfinite(j.visible):
@@ -188,18 +190,19 @@ def _level(shake: Vibration) -> str:
     """Vibration with its number."""
     if shake.stated:
         x, y, z = shake.rms
-        fine = "below 30, which ArduPilot calls acceptable" if max(shake.rms) < _HIGH else "above the acceptable 30"
+        fine = f"above the {STATED_MOST:g} that ArduPilot accepts" if shake.high else \
+               f"below {STATED_MOST:g}, which ArduPilot calls acceptable"  # fmt: skip
         return f"Vibration (VIBE) {x:.2g}, {y:.2g}, {z:.2g} m/s2 in x, y, z: {fine}."
-    if not np.isfinite(shake.line) or shake.unit != "m/s2" or not shake.rms:
+    if shake.unit != "m/s2" or not shake.rms or not (shake.high or np.isfinite(shake.line)):
         return ""
     total = float(np.linalg.norm(shake.rms))
     known = np.isfinite(shake.shaft_hz)
     what = "once a turn" if known else "likely once a turn; no speed was logged to know"
     where = ""
     if _stands_out(shake):
-        where = f", most of it at {shake.line_hz:.0f} Hz ({what}), as a rotor out of balance shakes"
-    high = "high: " if total > _HIGH else ""
-    return f"Vibration {high}{total:.2g} m/s2 above 20 Hz{where}."
+        where = f"most of it at {shake.line_hz:.0f} Hz ({what}), as a rotor out of balance shakes"
+    high = "too high (in PX4's rule z reaches x or y), " if shake.high else ""
+    return f"Vibration {total:.2g} m/s2 root mean square above 20 Hz, {high}{where}".rstrip(", ") + "."
 
 
 def _stands_out(shake: Vibration) -> bool:
@@ -293,8 +296,9 @@ def _heard(a: FlightAnswer) -> list[str]:
         return []
     seen = f"found in the spectrum: once a turn at {60 * shake.line_hz:.0f} rev/min, if so"
     where = "once a turn" if known else seen
-    lines = [f"Strongest vibration: amplitude {shake.line:.2g} {shake.unit} at {shake.line_hz:.0f} Hz ({where})."]
-    return lines + ([f"At twice that: {shake.twice:.2g} {shake.unit}."] if np.isfinite(shake.twice) else [])
+    mean = f"{shake.line / np.sqrt(2.0):.2g} {shake.unit} root mean square (amplitude {shake.line:.2g})"
+    lines = [f"Strongest vibration: {mean} at {shake.line_hz:.0f} Hz ({where})."]
+    return lines + ([f"At twice that: amplitude {shake.twice:.2g} {shake.unit}."] if np.isfinite(shake.twice) else [])
 
 
 def _along_axes(a: FlightAnswer) -> list[str]:

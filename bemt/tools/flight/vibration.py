@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bemt.base.arrays import Array
+from bemt.base.units import G0
 from bemt.tools.flight.balance import ALARM
 from bemt.tools.flight.log import FlightLog
 
@@ -32,6 +33,8 @@ Crazyflies (IMRC: brushed, brushless, with a payload) scatter by 0.35, 0.07 and 
 _MOST = float(np.log(10.0))  # by how much a rotor at fault raises the log of a level, at most (declared)
 _FLOOR = {"m/s2": 0.2, "rad/s": 0.02}
 """Amplitude below which no rotor is unbalanced in any way that matters (an assumption)."""
+STATED_MOST = 30.0
+"""VIBE up to which an autopilot does well, on each axis [m/s2]."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,19 @@ class Vibration:
         """Logarithm of the root mean square of all axes, no less than a sensor's noise; NaN where there is none."""
         least = 0.1 * _FLOOR[self.unit]
         return float(np.log(max(float(np.linalg.norm(self.rms)), least))) if self.rms else float("nan")
+
+    @property
+    def high(self) -> bool:
+        """Whether it is more than the rules of autopilots allow, each for the measure that it is made for.
+
+        ArduPilot states VIBE, a standard deviation, and accepts less than 30 m/s2 on each axis (Measuring Vibration).
+        PX4 looks at the accelerations: too high where those of z, which carries the weight, reach those of x or y (Log
+        Analysis using Flight Review), as a sine of the root mean squares here would. Neither was checked here.
+        """
+        if self.unit != "m/s2" or not self.rms:
+            return False
+        x, y, z = self.rms
+        return bool(max(self.rms) >= STATED_MOST if self.stated else np.sqrt(2.0) * (z + max(x, y)) >= G0)
 
     def alike(self, other: Vibration) -> bool:
         """Whether the levels of both are of one kind: same unit, both stated or neither, same rate within a tenth."""
