@@ -30,7 +30,7 @@ from bemt.tools.flight.log import FlightLog
 from bemt.tools.flight.picture import flight_picture
 from bemt.tools.flight.read import read_log
 from bemt.tools.flight.speed_sensor import checked
-from bemt.tools.flight.text import stated_size, text
+from bemt.tools.flight.text import pilot, stated_size, text
 from bemt.tools.flight.thrust_curve import inflow, motor_lag, simulator_constants
 from bemt.tools.flight.vibration import vibration
 from bemt.tools.flight.wind import wind
@@ -522,9 +522,17 @@ def test_recorded_thrust_in_moving_air(shared_data: Path) -> None:
 def test_recorded_wind(shared_data: Path, name: str, speed: float) -> None:
     """Within 2 m/s and the band, in steady wind and in gusts at the frequency of the flight."""
     folder = shared_data / "flight_logs" / "neural_fly"
-    got = answered(folder, f"baseline_{name}.csv.gz", healthy=[read_log(folder / "baseline_nowind.csv.gz")]).wind
+    answer = answered(folder, f"baseline_{name}.csv.gz", healthy=[read_log(folder / "baseline_nowind.csv.gz")])
+    got = answer.wind
     assert abs(got.speed - speed) < got.half
     assert abs(got.speed - speed) < 2.0
+    told = f"{got.speed:.1f} ± {got.half:.1f} m/s"
+    assert got.sure and told in pilot(answer)[0]
+    for less in (
+        replace(got, half=got.speed),
+        replace(got, speed=1.0, half=0.1),
+    ):  # not sure, and no more than a breeze
+        assert "m/s" not in pilot(replace(answer, wind=less))[0]
 
 
 def test_recorded_wind_by_the_drag_of_the_other_flights(shared_data: Path, monkeypatch: pytest.MonkeyPatch) -> None:

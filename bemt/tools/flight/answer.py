@@ -26,9 +26,8 @@ from bemt.tools.flight.repeat import Sessions, flight_scatter, sessions
 from bemt.tools.flight.speed_sensor import checked, speed_changes
 from bemt.tools.flight.thrust_curve import Inflow, inflow, simulator_constants, thrust_curve
 from bemt.tools.flight.vibration import Vibration, shaken, vibration
-from bemt.tools.flight.wind import Wind, wind
+from bemt.tools.flight.wind import BREEZE, Wind, wind
 
-_BREEZE = 2.0  # wind, or speed over ground beyond that of healthy flights, that may move the trim [m/s]
 _FULL = 0.98  # share of full drive that is a limit [1]
 _NEAR_LIMIT = 0.5  # demand in yaw that few mixers can give in full [1]
 
@@ -314,9 +313,9 @@ def _windy(log: FlightLog, healthy: Sequence[FlightLog], air: Wind) -> bool:
             return 0.0
         return float(np.mean(np.linalg.norm(one.velocity[one.flying, :2], axis=1)))
 
-    if air.speed > max(air.half, _BREEZE):
+    if air.speed > max(air.half, BREEZE):
         return True
-    return speed(log) > _BREEZE + max([speed(h) for h in healthy], default=0.0)
+    return speed(log) > BREEZE + max([speed(h) for h in healthy], default=0.0)
 
 
 def _mass(log: FlightLog, mine: Constant, known: Sequence[tuple[FlightLog, Constant]], healthy_mass: float) -> Constant:

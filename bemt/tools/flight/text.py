@@ -15,6 +15,7 @@ from bemt.tools.flight.identify import Constant
 from bemt.tools.flight.judge import FlightVerdict
 from bemt.tools.flight.log import SpeedSensor
 from bemt.tools.flight.vibration import STATED_MOST, Vibration
+from bemt.tools.flight.wind import BREEZE
 
 _OFTEN = 0.005  # share of the time at full command that is worth a word [1]
 _WORDS = {WIDE: "another spread between flights than usual"}
@@ -89,7 +90,13 @@ def _constants(a: FlightAnswer) -> list[str]:
 def pilot(a: FlightAnswer) -> list[str]:
     """Where to look, what else is certain or how small a damage would show, and the next step."""
     no = "Do not fly it as it is: it shakes more than an autopilot can take. " if a.vibration.high else ""
-    return [f"{no}{_look(a)}", _second(a), f"Next: {a.judged.next.text or 'nothing'}."]
+    return [f"{no}{_look(a)}{_in_wind(a)}", _second(a), f"Next: {a.judged.next.text or 'nothing'}."]
+
+
+def _in_wind(a: FlightAnswer) -> str:
+    """Wind that is sure and moves the trim."""
+    w = a.wind
+    return f" There was wind, {w.speed:.1f} ± {w.half:.1f} m/s." if w.sure and w.speed > BREEZE else ""
 
 
 def _second(a: FlightAnswer) -> str:

@@ -36,6 +36,8 @@ from bemt.base.units import G0
 from bemt.tools.flight.log import FlightLog
 from bemt.tools.flight.repeat import BATCHES, jackknifed, u_of_mean
 
+BREEZE = 2.0
+"""Wind, or speed over ground beyond that of healthy flights, that may move the trim [m/s]."""
 _SMOOTH_S = 0.2
 _SHARE, _FACTOR = 0.066, 0.3  # r [s/m] and the standard deviation of its logarithm
 _LAW = 0.05  # standard deviation of the law, a share of force and slope [1]
@@ -50,6 +52,11 @@ class Wind:
     half: float = float("nan")
     heading_deg: float = float("nan")
     missing: str = ""
+
+    @property
+    def sure(self) -> bool:
+        """Whether it is there: three standard deviations from none, of a half width of 1.96."""
+        return self.speed > 3.0 / 1.96 * self.half
 
 
 def wind(log: FlightLog, calm: Sequence[FlightLog]) -> Wind:
