@@ -579,6 +579,24 @@ def test_the_step_of_an_answer_keeps_rows_air_and_label(
         assert case is None or case in words
 
 
+def test_newtons_beside_coefficients_ask_for_what_turns_one_into_the_other(tmp_path: Path) -> None:
+    """Diameter and density of the file in newtons, and no more than is missing; with both the loads are equal."""
+    table = {k: v for k, v in stand(1).items() if k in ("rpm", "thrust_N", "torque_Nm")}
+    n, D, rho = table["rpm"] / 60.0, 10.0 * 0.0254, 1.2
+    coefficients = {"rpm": table["rpm"], "J": 0.0 * n, "CT": table["thrust_N"] / (rho * n**2 * D**4),
+                    "CP": 2.0 * np.pi * table["torque_Nm"] / (rho * n**2 * D**5)}  # fmt: skip
+    files = written(tmp_path / "n.csv", table), written(tmp_path / "c.csv", coefficients)
+    for order, letter in ((files, "A"), (files[::-1], "B")):
+        for given in ({}, {"label": "10x5"}, {f"air_{letter.lower()}": "1.2kg/m3"}):
+            with pytest.raises(InputError) as caught:
+                compare(*order, **given)
+            said = str(caught.value)
+            assert ("diameter" in said) == ("label" not in given) and "column rpm" not in said
+            assert (f"--air-{letter.lower()}" in said) == (not given or "label" in given)
+        change = compare(*order, label="10x5", **{f"air_{letter.lower()}": "1.2kg/m3"})
+        assert change.document["verdict"] == "none"
+
+
 def test_what_cannot_be_so_in_a_recording_is_said(tmp_path: Path) -> None:
     """More power at the shaft than goes into the motor, in B."""
     files = []

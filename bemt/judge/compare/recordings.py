@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.tables import number_of, some
 from bemt.base.units import ZERO_CELSIUS
 from bemt.data.recordings import cfd_setup
@@ -284,6 +284,7 @@ def changed(
             hint = "Head the column rpm, or record watts: thrust is compared at equal speed, power or throttle"
             expected = "a speed of rotation, J, electrical power or a throttle in both"
             raise InputError([Fault(r.points.name, "", _told(r), expected, hint) for r in silent])
+        refuse(_not_converted(a, b, diameter))
         got, expected = f"{_told(a)} in A, {_told(b)} in B", "one load that both recorded at two or more speeds"
         hint = "Name units in the headings, or use a recording.toml"
         if single := [run for run in (a, b) if len(run) == 1]:
@@ -294,6 +295,26 @@ def changed(
     assumed = tuple(_assumed(a, b, diameter, rotor.channels))
     notes = tuple(_notes(a, b, channels, {**rotor.strays, **behind.strays}))
     return RunChange(a, b, diameter, channels, ratios, rotor, behind, judge, assumed, notes)
+
+
+def _not_converted(a: StandRun, b: StandRun, diameter: float) -> list[Fault]:
+    """What is missing to make coefficients of the loads of one recording, where the other holds coefficients."""
+    coefficients, cells = {"CT", "CP", "CQ"}, {"thrust_N", "torque_Nm", "power_W"}
+    runs = (("A", a), ("B", b))
+    loads = [(n, r) for n, r in runs if cells & r.points.values.keys() and not coefficients & r.points.values.keys()]
+    if len(loads) != 1 or not any(coefficients & r.points.values.keys() for _, r in runs):
+        return []
+    ((letter, run),) = loads
+    missing = [
+        words for open_, words in (
+            ("rpm" not in run.points, f"the speed of rotation of {letter} (a column rpm)"),
+            (math.isnan(diameter), "the diameter (--label 10x5, or --case CASE)"),
+            (math.isnan(run.density), f"the air density of {letter} (--air-{letter.lower()} 22C,1013hPa)"),
+        ) if open_
+    ]  # fmt: skip
+    got = f"loads in newtons in {letter}, coefficients in {'B' if letter == 'A' else 'A'}"
+    expected = f"what CT = T / (rho n^2 D^4) needs: {' and '.join(missing)}"
+    return [Fault(f"{a.points.name}, {b.points.name}", "", got, expected, "")] if missing else []
 
 
 def _unloaded(a: StandRun, b: StandRun, diameter: float) -> bool:
