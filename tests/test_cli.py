@@ -6,6 +6,7 @@ import inspect
 import io
 import json
 import os
+import re
 import shutil
 import signal
 import socket
@@ -24,8 +25,9 @@ import bemt as package
 from bemt import __version__
 from bemt.app import cli, registry
 from bemt.app.face import PROGRESS, nothing_empty, parameters, parser_of
-from bemt.base.action import Told, about
+from bemt.base.action import Told, about, did_you_mean
 from bemt.base.errors import Fault, InputError
+from bemt.base.units import split_suffix
 from geometry.common import needs as geometry_needs
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -156,6 +158,28 @@ def test_both_doors_take_a_quantity_in_another_unit_that_its_suffix_names() -> N
         rotor.solve(rpm=6000, airspeed_kg=3.0)  # type: ignore[call-arg]
 
 
+def test_a_converted_quantity_is_stated_below_the_answer(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["estimate", "10x5", "--rpm", "6000", "--airspeed-km-h", "30", "36"]) == 0
+    stated = re.findall(r"--airspeed-km-h (\S+) is --airspeed-m-s (\S+)", capsys.readouterr().out)
+    assert [(float(a), float(b)) for a, b in stated] == [(30, pytest.approx(30 / 3.6, rel=1e-5)), (36, 10)]
+    assert cli.main(["estimate", "10x5", "--rpm", "6000", "--airspeed-m-s", "10"]) == 0
+    assert " is --" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", sorted(registry.homes()))
+def test_a_unit_alone_makes_no_option_near(name: str) -> None:
+    options = [one.option for one in parameters(registry.find(name))]
+    units = {split_suffix(one[2:].replace("-", "_"))[1] for one in options} - {None}
+    for unit in units:
+        suffix = unit.suffix.replace("_", "-")
+        assert did_you_mean(f"--zzqx-{suffix}", options) == ""
+    for one in options:
+        stem, unit = split_suffix(one[2:].replace("-", "_"))
+        if unit is not None and len(stem) > 4:
+            other = "deg" if unit.dimension != "angle" else "kg"
+            assert stem.replace("_", "-") in did_you_mean(f"--{stem[1:]}-{other}".replace("_", "-"), options)
+
+
 def test_a_wrong_keyword_is_answered_with_the_right_one() -> None:
     with pytest.raises(TypeError, match=r"solve\(\) got 'airspeed'. Did you mean airspeed_m_s\?"):
         package.propeller("10x5").solve(rpm=6000, airspeed=5.0)  # type: ignore[call-arg]
@@ -176,6 +200,9 @@ WRONG = [
     (["plan", "c", "--case", "a", "--case", "b"], "argument --case: got it twice; expected it once"),
     (["estimate", "8x5", "--rpm", "5000", "--chord", "3"], "unrecognized arguments: --chord 3"),
     (["estimate", "10x5", "--rmp", "6000"], "Did you mean --rpm?"),
+    (["estimate", "10x5", "--rpm", "6000", "--airspeed-kmh", "30"], "Did you mean --airspeed-km-h?"),
+    (["estimate", "10x5", "--rpm", "6000", "--airspeed-furlong", "30"], "Did you mean --airspeed-m-s?"),
+    (["new", "10x5", "--pitch-in", "5"], "--pitch-in 5. The pitch is in the label"),
     (["estimate", "10x5", "--rpm", "6k"], "--rpm: got 6k; expected a number, without its unit"),
     (["estimate", "cases", "--rpm", "6000"], "bemt sweep cases"),
     (["new", "10x5", "--kv", "2300", "--cells", "33"], "--kv, --cells: got 2300 rev/min/V on 33 cells"),

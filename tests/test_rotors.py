@@ -15,6 +15,7 @@ import population_fit as fit
 import pytest
 from population_fit import Rotors, with_families
 
+import bemt
 from bemt.__main__ import main
 from bemt.base.errors import InputError
 from bemt.rotors.case import load_case
@@ -404,6 +405,8 @@ def test_readings_are_doubted_for_contradicting_each_other_and_one_contradicts_n
     [
         (LABEL + '\nknown_from = "hearsay"', "blade.known_from"),
         (LABEL + '\nknown_from = "reference"', "blade.known_from"),
+        (LABEL + '\nknown_from = "measured"', "blade.known_from"),
+        (LABEL + '\nknown_from = "scan"\nas_built = {reading = "rpm=5400,thrust_g=410"}', "blade.known_from"),
         (LABEL + "\nlabel_pitch_in = 127", "blade.label_pitch_in"),
     ],
 )
@@ -411,6 +414,25 @@ def test_faults_of_a_case(tmp_path: Path, blade: str, where: str) -> None:
     with pytest.raises(InputError) as caught:
         load_case(_case(tmp_path / "case", blade))
     assert [f.where for f in caught.value.faults] == [where]
+
+
+@pytest.mark.parametrize("kind", ["propeller", "fan"])
+def test_a_reading_in_a_case_needs_no_second_key(tmp_path: Path, kind: str) -> None:
+    """What tells of the rotor as built says how it is known; a fan's case takes a reading as a propeller's does."""
+    if kind == "fan":
+        bemt.new("70mm", fan=True, out=tmp_path / "plain")
+        text, reading = (tmp_path / "plain" / "case.toml").read_text(), "rpm=49000, thrust_g=2100"
+    else:
+        _case(tmp_path / "plain")
+        text, reading = (tmp_path / "plain" / "case.toml").read_text(), "rpm=5400, thrust_g=410"
+    found = []
+    for name, key in (("one", ""), ("two", 'known_from = "reference"\n')):
+        (tmp_path / name).mkdir()
+        built = f'[blade]\n{key}as_built = {{reading = "{reading}"}}\n'
+        (tmp_path / name / "case.toml").write_text(text.replace("[blade]\n", built))
+        found.append(load_case(tmp_path / name).as_built())
+    assert np.array_equal(found[0].prior.mean, found[1].prior.mean) and found[0].prior.known_from == "reference"
+    assert not np.allclose(found[0].prior.mean, load_case(tmp_path / "plain").as_built().prior.mean)
 
 
 def test_a_stated_angle_turns_the_blade(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 from bemt.app import registry
 from bemt.app.registry import complain, progress
@@ -129,21 +129,28 @@ class Parser(argparse.ArgumentParser):
         self._words = list(args or ())
         known, extra = self.parse_known_args(args, namespace)
         if extra:
-            options = [option for action in self._actions for option in action.option_strings]
             unknown = dict.fromkeys(word.partition("=")[0] for word in extra if word.startswith("-"))
-            near = {w: self.elsewhere.get(w) or did_you_mean(w, options, 1).strip() for w in unknown}
+            near = {w: self._meant(w) for w in unknown}
             words = [f" {w}: {hint}" if len(unknown) > 1 else f" {hint}" for w, hint in near.items() if hint]
             words += [" Quotes keep words together."] if not extra[0].startswith("-") else []
             self.error(f"unrecognized arguments: {' '.join(extra)}." + "".join(words))
         return known
+
+    def _meant(self, word: str) -> str:
+        """Where the quantity of an unknown option is given, else the nearest option."""
+        from bemt.base.units import split_suffix
+
+        of = split_suffix(word[2:].replace("-", "_"))[0]
+        options = [option for action in self._actions for option in action.option_strings]
+        return self.elsewhere.get(of) or did_you_mean(word, options, 1).strip()
 
     def error(self, message: str) -> Any:
         """Say what is wrong in the words of the project, with the nearest option."""
         if message.startswith("the following arguments are required"):
             options = [option for action in self._actions for option in action.option_strings]
             typed = [word.partition("=")[0] for word in self._words if word.startswith("--")]
-            message += "".join(f". Got {w}.{did_you_mean(w, options)}" for w in typed if w not in options)
-            message += f". As in: {self.like}" if self.like else ""
+            message += "".join(f". Got {w}. {self._meant(w)}".rstrip(" .") for w in typed if w not in options)
+            message += f"{'.'[message.endswith('?') :]} As in: {self.like}" if self.like else ""
         number = re.match(r"argument (.+?): invalid (number|count|cells) value: '(.*)'$", message)
         if number:
             of_cells = "a whole number, as 3 or 3S"
@@ -265,16 +272,15 @@ def _fault(one: Option, got: str, expected: str) -> Exception:
 def parsed(function: Callable[..., Any], argv: Sequence[str], prog: str = "bemt") -> argparse.Namespace:
     """Words of a command line, by the parameters of its action."""
     known = parameters(function)
-    typed = registry.renamed(about(function).command, argv, {p.option for p in known}, complain)
+    typed, read = registry.renamed(about(function).command, argv, {p.option for p in known}, complain), list[str]()
     if {w.partition("=")[0].lower() for w in typed if w.startswith("--")} - {p.option.lower() for p in known}:
         from bemt.base.other_units import words_in_own_units
 
-        typed = words_in_own_units(typed, {p.option: p.name for p in known if p.kind == "number"})
+        typed, read = words_in_own_units(typed, {p.option: p.name for p in known if p.kind == "number"})
     if "--help-all" in typed:
         parser_of(function, prog, everything=True).print_help()
         raise SystemExit(EXIT_OK)
-    found: argparse.Namespace = parser_of(function, prog).parse_args(typed)
-    return found
+    return cast(argparse.Namespace, parser_of(function, prog).parse_args(typed, argparse.Namespace(converted=read)))
 
 
 def run(function: Callable[..., Any], argv: Sequence[str], prog: str = "bemt") -> int:
@@ -293,11 +299,11 @@ def run(function: Callable[..., Any], argv: Sequence[str], prog: str = "bemt") -
         if PROGRESS in inspect.signature(function).parameters:
             given[PROGRESS] = say
         answer = inner(**given)
-    return show(answer, args.json, args.quiet, args.details)
+    return show(answer, args.json, args.quiet, args.details, args.converted)
 
 
-def show(answer: Any, as_json: bool, quiet: bool, details: bool) -> int:
-    """Print an answer."""
+def show(answer: Any, as_json: bool, quiet: bool, details: bool, converted: Sequence[str] = ()) -> int:
+    """Print an answer, and below it the options that were given in other units."""
     for line in getattr(answer, "complaints", ()):
         complain(line)
     text = ""
@@ -308,6 +314,7 @@ def show(answer: Any, as_json: bool, quiet: bool, details: bool) -> int:
     elif not quiet:
         whole = getattr(answer, "details", "") if details else ""
         text = whole or (answer.screen() if hasattr(answer, "screen") and sys.stdout.isatty() else answer.text)
+        text = "\n".join([text.rstrip("\n"), *converted]) if converted else text
     if text:
         sys.stdout.write(text if text.endswith("\n") else f"{text}\n")
     return int(getattr(answer, "exit_code", EXIT_OK))

@@ -42,7 +42,7 @@ class Declaration:
     words: tuple[str, ...] = ()  # parameters that are bare words
     common: tuple[str, ...] = ()  # parameters that people use; the rest stands in --help-all
     shown: bool = False  # among the commands of `bemt --help`; the others stand under `bemt lab`
-    elsewhere: Mapping[str, str] = field(default_factory=dict)  # options that people look for here, and where they are
+    elsewhere: Mapping[str, str] = field(default_factory=dict)  # quantities looked for here, and where they are
 
 
 class Answered:
@@ -197,13 +197,37 @@ def check_choices(choices: Mapping[str, tuple[str, ...]], given: Mapping[str, An
 
 
 def did_you_mean(got: str, known: Iterable[str], most: int = 2) -> str:
-    """`` Did you mean X?`` when a known word is near, else nothing.
+    """`` Did you mean X?`` when a known word is near, else nothing; a unit at the end makes no word near.
 
     >>> did_you_mean("swep", ["sweep", "report"]), did_you_mean("x", ["sweep"])
     (' Did you mean sweep?', '')
+    >>> did_you_mean("--pitch-in", ["--diameter-in", "--chord-mm"]), did_you_mean("chord_cm", ["duct_mm", "chord_mm"])
+    ('', ' Did you mean chord_mm?')
+    >>> did_you_mean("--airspeed-kmh", ["--airspeed-m-s"])
+    ' Did you mean --airspeed-km-h?'
     """
-    near = difflib.get_close_matches(got, list(known), most, 0.6)
-    return f" Did you mean {' or '.join(near)}?" if near else ""
+    from bemt.base.other_units import respelled
+    from bemt.base.units import split_suffix
+
+    name, names = _plain(got), {word: _plain(word) for word in known}
+    if right := respelled(name, names.values()):
+        return f" Did you mean {'--' + right.replace('_', '-') if got.startswith('--') else right}?"
+    stem, unit = split_suffix(name)
+    near = {word: (_alike(stem, split_suffix(own)[0]), _alike(name, own)) for word, own in names.items()}
+    if unit is None:
+        near = {word: (max(both), both[1]) for word, both in near.items()}
+    best = sorted((word for word in near if near[word][0] >= 0.6), key=lambda word: near[word], reverse=True)[:most]
+    return f" Did you mean {' or '.join(best)}?" if best else ""
+
+
+def _plain(word: str) -> str:
+    """Option or parameter as a name."""
+    return word.lstrip("-").replace("-", "_").strip("_")
+
+
+def _alike(a: str, b: str) -> float:
+    """Share of the letters of two words that match in order."""
+    return difflib.SequenceMatcher(None, b, a).ratio()
 
 
 def in_words(sentence: str) -> str:

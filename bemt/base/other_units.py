@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, MutableMapping, Sequence
 from contextlib import suppress
 from typing import Any
 
-from bemt.base.units import UNITS, Unit, convert, split_suffix
+from bemt.base.units import UNITS, Unit, convert, split_suffix, suffix_of
 
 
 def own_name(name: str, names: Iterable[str]) -> str | None:
@@ -23,6 +23,20 @@ def own_name(name: str, names: Iterable[str]) -> str | None:
         if of == stem and known is not None and unit is not None and known.dimension == _weight(unit, known).dimension:
             return own
     return None
+
+
+def respelled(name: str, names: Iterable[str]) -> str:
+    """Name of a quantity with the suffix of its unit, where the unit is written in another way; "" for any other.
+
+    >>> respelled("airspeed_kmh", ["rpm", "airspeed_m_s"]), respelled("airspeed_inch", ["airspeed_m_s"])
+    ('airspeed_km_h', '')
+    """
+    for of, unit in map(split_suffix, names):
+        written = name.removeprefix(f"{of}_")
+        suffix = suffix_of(written) if unit and written != name else ""
+        if suffix not in ("", written) and own_name(f"{of}_{suffix}", [f"{of}_{unit.suffix}"] if unit else []):
+            return f"{of}_{suffix}"
+    return ""
 
 
 def _weight(unit: Unit, known: Unit) -> Unit:
@@ -60,13 +74,13 @@ def in_own_units(given: MutableMapping[str, Any], names: Sequence[str]) -> None:
             given[own] = converted(given.pop(name), name, own)
 
 
-def words_in_own_units(argv: Sequence[str], known: Mapping[str, str]) -> list[str]:
-    """Words of a command line; ``known`` are its options of numbers, with their parameters.
+def words_in_own_units(argv: Sequence[str], known: Mapping[str, str]) -> tuple[list[str], list[str]]:
+    """Words of a command line, and what was converted; ``known`` are its options of numbers, with their parameters.
 
     >>> words_in_own_units(["A", "--diameter-in", "10", "--json"], {"--diameter-m": "diameter_m"})
-    ['A', '--diameter-m', '0.254', '--json']
+    (['A', '--diameter-m', '0.254', '--json'], ['--diameter-in 10 is --diameter-m 0.254'])
     """
-    out, told, own = list[str](), "", None
+    out, read, told, own = list[str](), list[str](), "", None
     for word in argv:
         head, mark, value = word.partition("=")
         if word.startswith("--"):
@@ -78,6 +92,9 @@ def words_in_own_units(argv: Sequence[str], known: Mapping[str, str]) -> list[st
                 if not mark:
                     continue
         with suppress(ValueError):
-            word = word if own is None else repr(converted(float(word), told, known[own]))
+            if own is not None:
+                number = converted(float(word), told, known[own])
+                read.append(f"--{told.replace('_', '-')} {word} is {own} {number:.6g}")
+                word = repr(number)
         out.append(word)
-    return out
+    return out, read

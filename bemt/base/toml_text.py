@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from bemt.base.errors import Fault, InputError, refuse
-from bemt.base.units import UNITS, convert, split_suffix
+from bemt.base.units import SAID, UNITS, convert, split_suffix, suffix_of
 
 
 class Collector:
@@ -102,28 +102,8 @@ def _too_large(document: dict[str, Any]) -> tuple[str, str, str, str] | None:
     return None
 
 
-_SAID = {
-    "in": "inches", "rpm": "rev/min", "rad_s": "rad/s", "rev_s": "rev/s", "m_s": "m/s", "km_h": "km/h", "ft_s": "ft/s",
-    "pct": "%", "kg_m3": "kg/m3", "g_cm3": "g/cm3", "Pa_s": "Pa s", "kgf_cm": "kgf cm", "gf_cm": "gf cm",
-}  # fmt: skip
-_WRITTEN = {
-    "1/min": "rpm", "r/min": "rpm", "u/min": "rpm", "rps": "rev_s", '"': "in", "''": "in", "inch": "in", "degc": "C",
-    "celsius": "C", "degf": "F", "kelvin": "K", "knots": "kt", "kn": "kt", "percent": "pct", "degrees": "deg",
-    "degree": "deg", "kph": "km_h", "kg/m^3": "kg_m3", "metres": "m", "meters": "m",
-}  # fmt: skip
-"""Units as we say them, and as others write them; by suffix, and to it."""
 _QUANTITY = re.compile(r"([+-]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\d\s.,][^#,]*?)\s*")
 _LINE = re.compile(rf"\s*([\w.-]+?)\s*=\s*{_QUANTITY.pattern}(?:#.*)?")
-
-
-def _suffix(text: str) -> str:
-    """Suffix of a unit as somebody writes it; "" for an unknown one."""
-    t = text.strip().replace("°", "deg").replace("³", "3").replace("%", "pct")
-    known = {said: suffix for suffix, said in _SAID.items()}
-    for way in (t, known.get(t, ""), t.replace("/", "_").replace(" ", "_"), _WRITTEN.get(t.lower(), ""), t.lower()):
-        if way in UNITS:
-            return way
-    return ""
 
 
 def unit_hint(key: str, value: str) -> tuple[str, str] | None:
@@ -140,8 +120,8 @@ def unit_hint(key: str, value: str) -> tuple[str, str] | None:
     found = _QUANTITY.fullmatch(value.strip())
     if unit is None or found is None:
         return None
-    said, expected = _SAID.get(unit.suffix, unit.suffix), "the number alone, in {}"
-    other = _suffix(found[2])
+    said, expected = SAID.get(unit.suffix, unit.suffix), "the number alone, in {}"
+    other = suffix_of(found[2])
     if not other or UNITS[other].dimension != unit.dimension:
         return expected.format(said), f"The unit of {name} is {said}, as its key says" if name != key else ""
     if other == unit.suffix:

@@ -169,3 +169,30 @@ def suffixes(dimension: str) -> tuple[str, ...]:
     ('rad', 'deg')
     """
     return tuple(s for s, u in UNITS.items() if u.dimension == dimension)
+
+
+SAID = {
+    "in": "inches", "rpm": "rev/min", "rad_s": "rad/s", "rev_s": "rev/s", "m_s": "m/s", "km_h": "km/h", "ft_s": "ft/s",
+    "pct": "%", "kg_m3": "kg/m3", "g_cm3": "g/cm3", "Pa_s": "Pa s", "kgf_cm": "kgf cm", "gf_cm": "gf cm",
+}  # fmt: skip
+_WRITTEN = {
+    "1/min": "rpm", "r/min": "rpm", "u/min": "rpm", "rps": "rev_s", '"': "in", "''": "in", "inch": "in", "degc": "C",
+    "celsius": "C", "degf": "F", "kelvin": "K", "knots": "kt", "kn": "kt", "percent": "pct", "degrees": "deg",
+    "degree": "deg", "kph": "km_h", "kg/m^3": "kg_m3", "metres": "m", "meters": "m", "kmh": "km_h", "kts": "kt",
+    "mps": "m_s", "fps": "ft_s", "inches": "in", "feet": "ft",
+}  # fmt: skip
+"""Units as we say them, and as others write them; by suffix, and to it."""
+
+
+def suffix_of(text: str) -> str:
+    """Suffix of a unit as somebody writes it; "" for an unknown one.
+
+    >>> suffix_of("km/h"), suffix_of("kmh"), suffix_of("furlong")
+    ('km_h', 'km_h', '')
+    """
+    t = text.strip().replace("°", "deg").replace("³", "3").replace("%", "pct")
+    known = {said: suffix for suffix, said in SAID.items()}
+    for way in (t, known.get(t, ""), t.replace("/", "_").replace(" ", "_"), _WRITTEN.get(t.lower(), ""), t.lower()):
+        if way in UNITS:
+            return way
+    return ""

@@ -19,10 +19,16 @@ if TYPE_CHECKING:
 __all__ = ["calibrate", "cite", "estimate", "measured_rotors", "new", "stations", "validate"]
 
 
+_ELSEWHERE = {
+    "duct": "A duct is [duct] in the case (docs/duct.md); bemt new DIAMETER --fan writes one.",
+    "pitch": "The pitch is in the label, as the 5 of 10x5.",
+}
+
+
 @action(
     "Propellers and fans", "estimate 10x5 --rpm 6000", words=("label",), shown=True,
     common=("rpm", "airspeed_m_s", "blades", "chord_mm", "series", "reading", "angle_deg"),
-    elsewhere={"--duct": "A duct is [duct] in the case (docs/duct.md); bemt new DIAMETER --fan writes one."},
+    elsewhere=_ELSEWHERE,
 )  # fmt: skip
 def estimate(
     label: str, rpm: ArrayLike, airspeed_m_s: ArrayLike = 0.0, *, blades: Count | None = None,
@@ -90,7 +96,7 @@ def estimate(
 @action(
     "Propellers and fans", "new 10x5", words=("label",), shown=True,
     common=("stations", "scan", "fan", "blades", "kv", "cells", "rpm", "out"),
-    elsewhere={"--duct": "A duct is [duct] in the case (docs/duct.md); bemt new DIAMETER --fan writes one."},
+    elsewhere=_ELSEWHERE,
 )  # fmt: skip
 def new(
     label: str | None = None, *, stations: str | os.PathLike[str] | None = None,

@@ -28,7 +28,7 @@ class LipSeparation(Effect):
     flow reattaches below onset (1 - hysteresis), visible only if the recording has time.
 
     A lip also stalls because of the flow direction, at any load: the stagnation point moves outside as the velocity
-    ratio V / w of the inlet falls, and the suction peak is sharpest at rest (Kuchemann and Weber 1953, Aerodynamics
+    ratio V / w of the inlet falls, and the suction peak is sharpest at rest (Kuechemann and Weber 1953, Aerodynamics
     of Propulsion, ch. 4; not checked). ``by`` = "advance" uses 1 - V / w instead of the load: at rest, where it is 1,
     an inviscid flow loses the same share at every speed. ``by`` = "turning" uses the flow that turns into the mouth,
     (w - V)^2. The speed w is that of a straight duct by momentum, T = rho A w (w - V).

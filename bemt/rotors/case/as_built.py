@@ -52,9 +52,12 @@ class CaseAsBuilt:
 
 
 def known_from(blade: BladeTable) -> str:
-    """How the blade is known: as the case says, else by where its stations come from."""
+    """How the blade is known: as the case says, else by what tells of it as built, else by its stations."""
+    told = blade.as_built
     if blade.known_from is not None:
         return blade.known_from
+    if told is not None and (told.measured or told.file or told.reading):
+        return "measured" if told.measured else "reference"
     return "label" if blade.chord_law is not None else "cad" if blade.apc is not None else "stations"
 
 

@@ -207,7 +207,7 @@ def _faults(w: Wanted) -> list[Fault]:
         *_size_faults(w),
         *_broken(
             (w.reading is not None and (w.fan or drawn), "--reading", "without a label alone", "a label",
-             "Write blade.as_built.reading into the case"),
+             "Write it into the case: reading under [blade.as_built]"),
             (w.kv is not None and scan, "--kv", "together with --scan", "a label or stations",
              "Write [drive] into the case"),
             ((w.kv is None) != (w.cells is None), alone, "alone", "--kv and --cells together", ""),

@@ -139,6 +139,7 @@ def reading_text(reading: str | Mapping[str, float | str] | Sequence[Mapping[str
 
 def with_reading(case: Case, reading: str | Mapping[str, float] | Sequence[Mapping[str, float]]) -> Case:
     """Case of the rotor that gave a reading; what the reading settles is no assumption any more."""
+    from bemt.rotors.case.as_built import known_from
     from bemt.rotors.case.load import with_changes
 
     text = reading_text(reading)
@@ -147,7 +148,7 @@ def with_reading(case: Case, reading: str | Mapping[str, float] | Sequence[Mappi
     if blade.as_built is not None and blade.as_built.file is not None:
         raise InputError(Fault("--reading", "", repr(text), "a case that no recording calibrated"))
     changes = {"blade.as_built.reading": text}
-    if blade.known_from != "measured":
+    if known_from(blade) != "measured":
         changes["blade.known_from"] = "reference"
     return with_changes(case, changes)
 

@@ -159,10 +159,11 @@ def _check_as_built(out: Collector, blade: BladeTable) -> None:
     """Check that what tells of the rotor as built goes together."""
     told = AsBuiltTable() if blade.as_built is None else blade.as_built
     measured, posterior = told.measured, told.file is not None or (told.reading is not None and told.measured is None)
-    if (blade.known_from == "reference") != posterior:
-        got = 'known_from = "reference" without as_built.file or reading' if not posterior else "as_built"
+    if blade.known_from is not None and (blade.known_from == "reference") != posterior:
+        got = 'known_from = "reference" without as_built.file or reading' if not posterior else repr(blade.known_from)
         expected = 'known_from = "reference" and blade.as_built.file or reading together'
-        out.add("blade.known_from", got, expected, "bemt lab calibrate-rotor writes both")
+        hint = "Write [blade.as_built] with reading, or take the case that bemt lab calibrate-rotor writes"
+        out.add("blade.known_from", got, expected, hint if not posterior else "as_built says it: delete known_from")
     if told.file is not None and (told.reading is not None or measured is not None):
         out.add("blade.as_built.file", repr(told.file), "nothing else that tells of the rotor beside it")
     if told.reading is not None:
@@ -171,7 +172,7 @@ def _check_as_built(out: Collector, blade: BladeTable) -> None:
         except InputError as error:
             for fault in error.faults:
                 out.add("blade.as_built.reading", fault.got, fault.expected, fault.hint)
-    if (blade.known_from == "measured") != (measured is not None):
+    if blade.known_from is not None and (blade.known_from == "measured") != (measured is not None):
         expected = 'known_from = "measured" and blade.as_built.measured together'
         out.add("blade.known_from", f"{blade.known_from!r}, as_built.measured {measured!r}", expected)
     if measured is not None and measured not in records():

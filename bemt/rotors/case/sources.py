@@ -6,7 +6,10 @@ import re
 import shutil
 import textwrap
 import unicodedata
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
+from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 from bemt.data.readers import references as reference_file
@@ -156,11 +159,26 @@ _LATEX = {c: f"\\{c}" for c in "&%$#_"} | {
 """As LaTeX prints a character; BibTeX counts a brace behind a backslash too."""
 
 
+@lru_cache
+def works() -> dict[str, tuple[str, dict[str, str]]]:
+    """Type and fields of the works in ``works.bib``; by first author and year, a letter for a second one."""
+    text = Path(__file__).with_name("works.bib").read_text(encoding="utf-8")
+    rows = re.findall(r"^@(\w+)\{(\w+), (.*)\}$", text, re.M)
+    return {key: (kind, dict(re.findall(r"(\w+) = \{(.*?)\}(?=, \w+ = \{|$)", rest))) for kind, key, rest in rows}
+
+
+def _named(text: str, keys: Iterable[str]) -> list[str]:
+    """Those of the works whose title or number a text has."""
+    told = {k: [re.sub(r"[{}\\]", "", works()[k][1].get(name, "")) for name in ("title", "number")] for k in keys}
+    return [k for k in told if any(len(words) > 5 and words.lower() in text.lower() for words in told[k])]
+
+
 def bibtex(found: Sources) -> str:
     """Works that an answer stands on, as BibTeX.
 
-    Each work with an author and a year that a source names is an entry ``@misc``, whose note is what the source says of
-    it ("not checked" included) and where it is used; a source without both is a comment.
+    A work that the physics names has the fields of ``works.bib``; any other with an author and a year, as of a user's
+    table of references, is ``@misc`` with what the source says of it as title. The note tells where it is used and
+    "not checked"; a source that names no work is a comment.
 
     Parameters
     ----------
@@ -174,30 +192,39 @@ def bibtex(found: Sources) -> str:
     """
     from bemt import __version__
 
-    entries: dict[str, tuple[str, str, str, list[str]]] = {}
+    about = {"author": "{the bemt maintainers}", "title": "bemt", "year": str(YEAR), "version": __version__}
+    entries = {"bemt": ("misc", about)}
+    notes: dict[str, dict[str, None]] = {}
+    used: dict[str, dict[str, None]] = {}
     bare = []
     for source in found[1:]:
-        works = list(_WORK.finditer(source.source))
-        for work in works:
+        cited: dict[str, bool] = {}  # whether the source doubts it
+        for work in _WORK.finditer(source.source):
             who, year, rest = work.groups()
             plain = unicodedata.normalize("NFKD", who).encode("ascii", "ignore").decode()
             key = re.sub(r"\W", "", plain.split(",")[0].split(" ")[0].lower()) + year
+            key = next(iter(_named(rest, [k for k in works() if k.rstrip("abc") == key])), key)
             what = " ".join(rest.split()).strip(" ,.:").removeprefix("not checked")
-            if re.match(r"[ (,;]*(?:\w+ ){0,2}not checked", source.source[work.end() :]):
-                what = f"{what} (not checked)".strip()
-            known = entries.get(key, (who, year, "", []))
-            entries[key] = (*known[:2], known[2] or what, [*known[3], source.name])
-        if not works:
+            if key not in works() and (key not in entries or entries[key][1]["title"] == next(iter(used[key]))):
+                author = re.sub(r"\s*,\s*(?:and )?", " and ", who).replace(" et al.", " and others")
+                told = {"author": author, "title": what or source.name, "year": year}
+                entries[key] = "misc", {name: _latex(value) for name, value in told.items()}
+            doubted = re.match(r"[^;()]*?[ (,;]*(?:\w+ ){0,2}not checked", rest + source.source[work.end() :])
+            cited[key] = cited.get(key, False) or doubted is not None
+        cited |= {key: False for key in _named(_WORK.sub("", source.source), works()) if key not in cited}
+        for key, doubt in cited.items():
+            entries.setdefault(key, works().get(key, ("misc", {})))
+            said = entries[key][1].get("note", "not checked" if doubt else "")
+            notes.setdefault(key, {}).update({said: None} if said else {})
+            used.setdefault(key, {})[source.name] = None
+        if not cited:
             words = " ".join(source.source.split()).replace("@", " at ")  # which would begin an entry
             bare.append(f"% {source.name}: {words}")
-    about = {"author": "{the bemt maintainers}", "title": "bemt", "year": YEAR, "note": f"version {__version__}"}
-    lines = [f"@misc{{bemt, {', '.join(f'{k} = {{{v}}}' for k, v in about.items())}}}"]
-    for key, (who, year, what, used) in entries.items():
-        author = re.sub(r"\s*,\s*(?:and )?", " and ", who).replace(" et al.", " and others")
-        doi = re.search(r"doi:\s*(10\.\d+/[^\s,)]+)", what)
-        note = f"{what}; in {', '.join(dict.fromkeys(used))}" if what else f"in {', '.join(dict.fromkeys(used))}"
-        fields = [f"author = {{{_latex(author)}}}", f"year = {{{year}}}", f"note = {{{_latex(note)}}}"]
-        lines.append(f"@misc{{{key}, {', '.join([*fields, *([f'doi = {{{doi[1]}}}'] if doi else [])])}}}")
+    lines = []
+    for key, (kind, fields) in entries.items():
+        where = [f"in {_latex(', '.join(used[key]))}"] if key in used else []
+        told = fields | ({"note": "; ".join([*notes[key], *where])} if where else {})
+        lines += [f"@{kind}{{{key},", *(f"  {name} = {{{value}}}," for name, value in told.items()), "}"]
     return "\n".join([*lines, *bare]) + "\n"
 
 
