@@ -24,7 +24,7 @@ from bemt.base.toml_text import Collector, load_toml
 from bemt.data.readers import head_text, load_text
 from bemt.data.readers._large import NumberTable, large_table
 from bemt.data.readers.generic_csv import electrical, heads_of, only_ones
-from bemt.data.readers.headings import Heading, known, meanings
+from bemt.data.readers.headings import Heading, in_rpm, known, meanings
 from bemt.data.readers.recording import Builder
 from bemt.data.readers.samples import Channel
 from bemt.data.readers.split import SplitTable, decimal_mark, split_table
@@ -303,11 +303,8 @@ def _instrument(columns: Any) -> dict[str, dict[str, float]]:
 
 
 def _heading(name: str, unit: str, text: str) -> Heading:
-    if unit == "-":
-        return known(text, name, "-")
     if QUANTITIES[name] == "angular_speed":
-        u = units.UNITS[unit]
-        return Heading(text, name, u if unit == "rpm" else units.Unit("", "angular_speed", u.factor / units.RPM))
+        return Heading(text, name, in_rpm(units.UNITS[unit]))
     return known(text, name, unit)
 
 

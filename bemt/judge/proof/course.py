@@ -54,9 +54,9 @@ class Course:
 
     def named(self, at: int | None = None) -> list[str]:
         """Causes that were named up to an answer, all by default, in order."""
-        last = self.answers[-1 if at is None else at]
-        said = [*(n for some in self.aside[:at] for n in some), *(last.effects if last.verdict in DONE else ())]
-        return list(dict.fromkeys(said))
+        last = (self.answers if at is None else self.answers[: at + 1])[-1:]
+        said = [*self.aside[:at], *(a.effects for a in last if a.verdict in DONE)]
+        return list(dict.fromkeys(n for some in said for n in some))
 
 
 class After(Documented):

@@ -8,7 +8,7 @@ import secrets
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -66,7 +66,7 @@ class StandAnswer(Answered):
     @property
     def found(self) -> tuple[str, ...]:
         """Causes that were named, in order."""
-        return tuple(self.course.named()) if self.course.answers else ()
+        return tuple(self.course.named())
 
     @property
     def text(self) -> str:
@@ -238,15 +238,15 @@ def sit(
         except Stopped as error:
             log.stop(str(error))
     there = sealed.bench_of(out / "sealed", "0000")[1].causes if on == "simulated" else None
-    answer = StandAnswer(rotor.name, log.course, log.stopped, there)
     spent = sum(log.course.minutes) + minutes("run", len(points))
     end = log.stopped or log.course.end or "no run"
-    log.tell(f"found: {_found(answer)}; ended by: {end}; {spent:.0f} min of stand time")
+    log.tell(f"found: {_found(log.course)}; ended by: {end}; {spent:.0f} min of stand time")
     if there is not None:
         log.tell(f"unsealed: there was {', '.join(there) or 'nothing wrong'}")
+    files = out / "stand.json", out / "log.txt", *write_story(out, rotor, log.course, hand.made, log.lines)
+    answer = StandAnswer(rotor.name, log.course, log.stopped, there, files, "\n".join(log.lines))
     write_atomic(out / "stand.json", json_text(answer.to_dict()))
-    files = write_story(out, rotor, answer.course, hand.made, log.lines)
-    return replace(answer, files=(out / "stand.json", out / "log.txt", *files), details="\n".join(log.lines))
+    return answer
 
 
 def _diagnosed(out: Path, question: list[str], hand: Wired, runs: int, log: _Log) -> None:
@@ -258,14 +258,14 @@ def _diagnosed(out: Path, question: list[str], hand: Wired, runs: int, log: _Log
     log.course = follow(out, first, hand, runs, enough=A_RUN, tell=log.told, words=question)
 
 
-def _found(answer: StandAnswer) -> str:
+def _found(course: Course) -> str:
     """What was found, and what was left open."""
-    last = answer.course.answers[-1] if answer.course.answers else None
-    if last is None:
+    if not course.answers:
         return "nothing, as nothing was measured"
+    last, found = course.answers[-1], course.named()
     left = {"class": f"one of {', '.join(last.effects)}", "none": "nothing wrong", "insufficient": "not settled",
             "unknown": "something that is not in the library"}.get(last.verdict, "")  # fmt: skip
-    return ", ".join([*answer.found, *([left] if left and (not answer.found or last.verdict == "class") else [])])
+    return ", ".join([*found, *([left] if left and (not found or last.verdict == "class") else [])])
 
 
 def _limits(rotor: Propeller, on: str, given: Mapping[str, float | None], top_rpm: float, lapse: float) -> Limits:

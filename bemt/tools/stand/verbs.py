@@ -147,7 +147,6 @@ class Stand(contextlib.AbstractContextManager["Stand"]):
     def at_speed(self, rpm: float) -> SettledRow:
         """Find the pulse width of a speed from what was read so far, and read a row there. [rev/min]"""
         low, high = self.limits.stop_us, self.limits.largest_us
-        row = None
         for _ in range(_TRIES):
             speeds, widths = zip(*sorted((n, us) for us, n in {low: 0.0, **self.known}.items()), strict=True)
             if rpm < speeds[-1]:
@@ -162,7 +161,6 @@ class Stand(contextlib.AbstractContextManager["Stand"]):
             self.known[us] = row.mean["rpm"]
             if abs(row.mean["rpm"] / rpm - 1.0) < _NEAR or us >= high:
                 break
-        assert row is not None
         return row
 
     def stop(self) -> None:
