@@ -30,6 +30,8 @@ MIN_ROWS = 12
 """Rows in a revolution below which an average is refused (30 deg a step)."""
 FEW_ROWS = 36
 """Rows in a revolution below which an average is doubtful (10 deg a step)."""
+PERIODIC = 0.02
+"""Difference of the means of single revolutions above which a history is not periodic. [1]"""
 STEADY_SHARE = 0.2
 """Last part of a steady run that its mean is taken over."""
 
@@ -62,6 +64,13 @@ class Average:
         """Revolutions that were averaged, with their times and rows, in words."""
         rows = f"{self.start:.6g} to {self.end:.6g} s, {number_of(self.rows, 'row')}"
         return f"last {number_of(self.revolutions, 'revolution')} ({rows})"
+
+    @property
+    def unlike(self) -> float:
+        """Largest less smallest mean of a revolution over the mean [1]; 0 where that is less than `PERIODIC`."""
+        turns = self.per_revolution
+        size = (max(turns) - min(turns)) / abs(self.mean) if turns and self.mean else 0.0
+        return size if size > PERIODIC else 0.0
 
 
 def _mean(values: Array, weights: Array) -> float | None:

@@ -142,10 +142,10 @@ def in_usual_unit(text: str, base: str, unit: str) -> Heading:
     goes = unit_for(found.unit.dimension, said[1].strip())
     if goes is None:
         return replace(found, unit=None, doubt=f"{said[1].strip()!r} is no unit of it")
-    return replace(found, unit=_in_rpm(goes[0]))
+    return replace(found, unit=in_rpm(goes[0]))
 
 
-def _in_rpm(unit: units.Unit) -> units.Unit:
+def in_rpm(unit: units.Unit) -> units.Unit:
     """Unit of a speed of rotation that gives rev/min; any other as it is."""
     if unit.dimension != "angular_speed" or unit.suffix == "rpm":
         return unit
@@ -360,10 +360,9 @@ def _by_words(text: str) -> Heading | None:
                 continue
             made, told = goes
             if dimension == "angular_speed":
-                if made.suffix == "rad_s" and name == "rpm":  # an angular speed is the reduction's to convert
-                    turns = units.Unit("", "angular_speed", 1.0 / units.RPM)
-                    return Heading(text, "rpm", turns) if words == ["rotation", "speed"] else None
-                return Heading(text, slug(name), _in_rpm(made))
+                if made.suffix == "rad_s" and name == "rpm" and words != ["rotation", "speed"]:
+                    return None  # an angular speed is the reduction's to convert
+                return Heading(text, slug(name), in_rpm(made))
             return Heading(text, _channel(slug(name), made), made, told=f"{text!r} is read as {told}" if told else "")
     return None
 

@@ -60,8 +60,8 @@ def sniff(head: bytes | str) -> bool:
 def read(path: str | os.PathLike[str]) -> Dataset:
     """Read one log. ["mode"]"""
     build = Builder.of_stand(path, KIND)
-    build.check()
-    table = build.table
+    table, source = build.table, build.table.source
+    source.check()
     sides = [_side(text) for text in table.headings]
     turned = [side for side in dict.fromkeys(side for _, side in sides if side) if _turned(table, sides, side)]
     for k, (text, (plain, side)) in enumerate(zip(table.headings, sides, strict=True)):
@@ -73,9 +73,9 @@ def read(path: str | os.PathLike[str]) -> Dataset:
         build.warnings.append(f"motors {' and '.join(turned)} turned: name the columns of one in a recording.toml")
     elif turned and len({side for _, side in sides if side}) > 1:
         build.warnings.append(f"only motor {turned[0]} turned: its columns have the plain names")
-    if "time_s" not in build.channels and not build.faults:
-        build.fault("1", "no numbers in Time (s)", "the time of every row")
-    build.check()
+    if "time_s" not in build.channels and not source.faults:
+        source.add("1", "no numbers in Time (s)", "the time of every row")
+    source.check()
     said = {"stand": "RCbenchmark / Tyto", "mode": _mode(build)}
     build.flag_time()
     _speeds(build)

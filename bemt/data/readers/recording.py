@@ -19,7 +19,6 @@ import numpy as np
 
 from bemt.base import unit_errors
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, refuse
 from bemt.base.tables import number_of, some
 from bemt.data.readers import load_text
 from bemt.data.readers._large import NumberTable
@@ -70,7 +69,6 @@ class Builder:
     flags: dict[int, list[str]] = field(default_factory=dict)
     headings: dict[str, str] = field(default_factory=dict)
     declared: dict[str, float] = field(default_factory=dict)  # Units of what was converted, in that of the channel
-    faults: list[Fault] = field(default_factory=list)
     unitless: list[str] = field(default_factory=list)
     empty: list[str] = field(default_factory=list)
     words: list[str] = field(default_factory=list)
@@ -95,34 +93,24 @@ class Builder:
     def of_stand(cls, path: str | os.PathLike[str], format: str) -> Builder:  # noqa: A002
         """Begin with the table of a stand, whose headings are known and stand once each."""
         table = split_table(load_text(path), header=True)
-        build = cls(table, format, decimal=decimal_mark(table))
-        names = build.table.headings
-        for name in sorted(h for h, times in Counter(names).items() if h and times > 1):
-            build.fault("1", f"a second column {name!r}", "each column once")
-        return build
+        for name in sorted(h for h, times in Counter(table.headings).items() if h and times > 1):
+            table.source.add("1", f"a second column {name!r}", "each column once")
+        return cls(table, format, decimal=decimal_mark(table))
 
     def add_usual(self, index: int, base: str, unit: str) -> None:
         """Add a stand's own column in its usual unit or in the one that its heading states; no such unit is a fault."""
         head = in_usual_unit(self.table.headings[index].strip(), base, unit)
         if head.unit is None:
             line = getattr(self.table, "headings_line", 1)
-            self.fault(f"{line}:{index + 1}", repr(head.text), f"a unit such as {unit}", head.doubt)
+            self.table.source.add(f"{line}:{index + 1}", repr(head.text), f"a unit such as {unit}", head.doubt)
         else:
             self.add(index, head)
-
-    def fault(self, where: object, got: str, expected: str, hint: str = "") -> None:
-        """Note a fault."""
-        self.faults.append(Fault(self.table.source.name, str(where), got, expected, hint))
-
-    def check(self) -> None:
-        """Raise the faults so far, if any."""
-        refuse(self.faults)
 
     def need(self, *names: str) -> None:
         """Note channels that are not there."""
         for name in names:
             if name not in self.channels:
-                self.fault("1", f"no numbers for {name}", "a column of numbers")
+                self.table.source.add("1", f"no numbers for {name}", "a column of numbers")
 
     def at(self, name: str) -> Array | None:
         """Values of a channel, None without it."""
@@ -237,7 +225,7 @@ class Builder:
             for i in lone_points(split.cells(index))[:1]:
                 got = f"{split.cell(i, index)!r} among the decimal commas of {label!r}"
                 hint = "Thousands or decimals? Write it with a comma, or without a mark"
-                self.fault(f"{self.line(i)}:{index + 1}", got, "one decimal mark", hint)
+                self.table.source.add(f"{self.line(i)}:{index + 1}", got, "one decimal mark", hint)
         if self.decimal != ".":
             return False
         cells = {i: self.table.cell(i, index) for i in bad}
@@ -248,7 +236,7 @@ class Builder:
             hint += f"; {odd}" if split is not None and (odd := odd_mark(split)) else ""
             if all(_THOUSANDS.fullmatch(cells[i]) for i in comma):
                 hint = f"A comma between thousands? Export without. If not: {hint[0].lower()}{hint[1:]}"
-            self.fault(f"{self.line(comma[0])}:{index + 1}", got, "a number with a decimal point", hint)
+            self.table.source.add(f"{self.line(comma[0])}:{index + 1}", got, "a number with a decimal point", hint)
         return bool(comma)
 
     def _add_text(self, index: int, head: Heading, label: str, bad: Sequence[int], filled: int) -> str:
@@ -352,10 +340,10 @@ class Builder:
 
     def finish(self, provenance: Mapping[str, str] | None = None, **more: Any) -> Dataset:
         """Make the `Dataset`, or raise all faults."""
-        if not self.channels and not self.faults:
+        if not self.channels and not self.table.source.faults:
             columns = f"{number_of(len(self.texts), 'column')} of text" if self.texts else "empty columns"
-            self.fault("", f"no column of numbers ({columns})", "one column of numbers or more")
-        self.check()
+            self.table.source.add("", f"no column of numbers ({columns})", "one column of numbers or more")
+        self.table.source.check()
         if self.empty:
             self.warnings.append(Remark(f"no values in {number_of(len(self.empty), 'column')}: {some(self.empty, 8)}"))
         if self.words:

@@ -24,7 +24,7 @@ from bemt.base.toml_text import Collector, load_toml
 from bemt.data.readers import head_text, load_text
 from bemt.data.readers._large import NumberTable, large_table
 from bemt.data.readers.generic_csv import electrical, heads_of, only_ones
-from bemt.data.readers.headings import Heading, known, meanings
+from bemt.data.readers.headings import Heading, in_rpm, known, meanings
 from bemt.data.readers.recording import Builder
 from bemt.data.readers.samples import Channel
 from bemt.data.readers.split import SplitTable, decimal_mark, split_table
@@ -303,19 +303,15 @@ def _instrument(columns: Any) -> dict[str, dict[str, float]]:
 
 
 def _heading(name: str, unit: str, text: str) -> Heading:
-    if unit == "-":
-        return known(text, name, "-")
     if QUANTITIES[name] == "angular_speed":
-        u = units.UNITS[unit]
-        return Heading(text, name, u if unit == "rpm" else units.Unit("", "angular_speed", u.factor / units.RPM))
+        return Heading(text, name, in_rpm(units.UNITS[unit]))
     return known(text, name, unit)
 
 
 def _places(file: str, table: SplitTable | NumberTable, columns: Mapping[str, ColumnTable]) -> dict[int, str]:
     """Quantity of each column that is named, by its heading or its number."""
     width = table.width
-    places: dict[int, str] = {}
-    faults = []
+    places, out = dict[int, str](), Collector(file)
     for name, column in columns.items():
         place = column.column
         if isinstance(place, int):
@@ -326,10 +322,10 @@ def _places(file: str, table: SplitTable | NumberTable, columns: Mapping[str, Co
         if index is None or index in places:
             known = some((repr(h) for h in table.headings if h), 12) or f"columns 1 to {width}"
             got = " again" if index is not None else f", which {table.source.name} has not (or twice)"
-            faults.append(Fault(file, f"columns.{name}.column", f"{place!r}{got}", f"one of {known}"))
+            out.add(f"columns.{name}.column", f"{place!r}{got}", f"one of {known}")
         else:
             places[index] = name
-    refuse(faults)
+    out.check()
     return places
 
 
@@ -339,27 +335,27 @@ def _run(file: str, path: Path, made: RecordingToml) -> Dataset:
     large = large_table(path) if not {"delimiter", "header", "decimal"} & head.model_fields_set else None
     told = (head.delimiter, head.header)
     table = large[0] if large is not None and large[1] == "." else split_table(load_text(path), *told)
-    width, places = table.width, _places(file, table, columns)
+    places = _places(file, table, columns)
     stated = "decimal" in head.model_fields_set
     decimal = decimal_mark(table) if isinstance(table, SplitTable) and not stated else head.decimal
     build = Builder(table, KIND, decimal=decimal, stated=made.options())
     heads = heads_of(table)
     known = f"one of {some((repr(h) for h in table.headings if h), 12)}"
     refuse(Fault(file, "recording.ignore", repr(h), known) for h in head.ignore if h not in table.headings)
-    for k in sorted(range(width), key=lambda k: k not in places):
+    for k in sorted(range(table.width), key=lambda k: k not in places):
         text = table.headings[k] if table.headings else ""
         if k in places:
             column = columns[places[k]]
             at = _heading(places[k], column.unit, text or f"column {k + 1}")
             rows = len(build.unitless)
             name = build.add(k, at, float(column.sign))
-            if not name and not build.faults:
+            if not name and not table.source.faults:
                 where = f"columns.{places[k]}.column"
-                build.faults.append(Fault(file, where, f"column {k + 1} without numbers", "a column of numbers"))
+                table.source.faults.append(Fault(file, where, f"column {k + 1} without numbers", "a column of numbers"))
             del build.unitless[rows:]
         elif text not in head.ignore:
             build.add(k, heads[k])
-    if not build.faults:
+    if not table.source.faults:
         only_ones(build)
         if "power" not in columns:
             electrical(build)

@@ -17,7 +17,6 @@ import numpy as np
 
 from bemt.base import units
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.tables import some
 from bemt.data.readers import Reader, SourceText, head_text, load_text, number
 from bemt.data.readers.cfd import unit_of
@@ -115,44 +114,42 @@ def _per_length(dimension: str, text: str) -> float:
 
 def read(path: str | os.PathLike[str]) -> dict[str, Slices]:
     """Slices of each run in a table; one without a column ``run`` is one run, named "slices"."""
-    name = os.fspath(path)
     table = split_table(_as_table(load_text(path)))
+    source = table.source
     comma = decimal_mark(table) == ","
     heads = [h.strip() for h in table.headings]
-    loads, over_R = _load_columns(name, heads)
+    loads, over_R = _load_columns(source, heads)
     wanted = loads | _state_columns(heads)
     label = next((k for k, h in enumerate(heads) if h.lower() in ("run", "case", "name", "design point")), None)
-    faults: list[Fault] = []
     runs: dict[str, list[list[float]]] = {}
     for line, cells in zip(table.lines, table.rows, strict=True):
         row = []
         for k, factor in wanted.values():
             text = cells[k].strip()
             if (value := number(text.replace(",", ".") if comma else text)) is None:
-                faults.append(Fault(name, f"{line}: {heads[k]}", repr(text), "a number"))
+                source.add(f"{line}: {heads[k]}", repr(text), "a number")
             row.append((value or 0.0) * factor)
         runs.setdefault("slices" if label is None else cells[label].strip(), []).append(row)
-    refuse(faults)
-    return {run: _slices(name, run, [*wanted], np.array(body).T, over_R) for run, body in runs.items()}
+    source.check()
+    return {run: _slices(source, run, [*wanted], np.array(body).T, over_R) for run, body in runs.items()}
 
 
-def _load_columns(file: str, heads: Sequence[str]) -> tuple[dict[str, tuple[int, float]], bool]:
+def _load_columns(source: SourceText, heads: Sequence[str]) -> tuple[dict[str, tuple[int, float]], bool]:
     """Column and factor to SI of the radius and of each load, and whether the radius is over that of the tip."""
-    faults: list[Fault] = []
     at: dict[str, tuple[int, float]] = {}
     for k, h in enumerate(heads):
         meant = slice_heading(h)
         if isinstance(meant, tuple):
             at.setdefault(meant[0], (k, meant[1]))
         elif meant:
-            faults.append(Fault(file, h, meant, "a unit", f"As in {_EXAMPLE}"))
+            source.add(h, meant, "a unit", f"As in {_EXAMPLE}")
     share = at.pop("r/R", None)
     over_R = share is not None and "r" not in at
     at |= {"r": share} if share is not None and over_R else {}
     words = {"r": "radius", "thrust": "thrust_per_radius_N_m", "torque": "torque_per_radius_Nm_m"}
-    if not faults and (missing := [text for q, text in words.items() if q not in at]):
-        faults = [Fault(file, "", f"columns {some(heads, 8)}: no {', '.join(missing)}", _EXAMPLE)]
-    refuse(faults)
+    if not source.faults and (missing := [text for q, text in words.items() if q not in at]):
+        source.add("", f"columns {some(heads, 8)}: no {', '.join(missing)}", _EXAMPLE)
+    source.check()
     return at, over_R
 
 
@@ -182,19 +179,19 @@ def _as_table(source: SourceText) -> SourceText:
     if len(known) < len(curves) or radii.count(radii[0]) < len(radii):
         got = f"a Fluent XY plot of {labels[2]!r} over {labels[1]!r}, curves {some(map(repr, curves), 4)}"
         hint = "One table with both loads at the same radii; Fluent takes such labels of axes and curves"
-        raise InputError(Fault(source.name, "", got, _EXAMPLE, hint))
+        source.refuse("", got, _EXAMPLE, hint)
     rows = zip(radii[0], *([y for _, y in rows] for rows in curves.values()), strict=True)
     return replace(source, text="\n".join("\t".join(row) for row in ((labels[1], *curves), *rows)) + "\n")
 
 
-def _slices(file: str, run: str, names: list[str], values: Array, over_R: bool) -> Slices:
+def _slices(source: SourceText, run: str, names: list[str], values: Array, over_R: bool) -> Slices:
     """One run, by radius."""
     v = dict(zip(names, values[:, np.argsort(values[names.index("r")], kind="stable")], strict=True))
     stated = {}
     for key in v.keys() - {"r", *LOADS}:
         if np.ptp(v[key]) > 1e-3 * abs(float(v[key][0])):
             got = f"{', '.join(f'{x:g}' for x in np.unique(v[key])[:4])} in run {run}"
-            raise InputError(Fault(file, key, got, "one value in each run", "A column run keeps the runs apart"))
+            source.refuse(key, got, "one value in each run", "A column run keeps the runs apart")
         stated[key] = float(v[key][0])
     return Slices(v["r"], v["thrust"], v["torque"], stated, over_R)
 

@@ -240,9 +240,9 @@ class StandTable:
                 build.add_usual(k, *usual)
             elif self.others:
                 build.add(k, Heading(text, slug(text) or "column", None, self.others))
-        build.check()
+        build.table.source.check()
         build.need(*self.needs)
-        build.check()
+        build.table.source.check()
         return self.finish(build)
 
 

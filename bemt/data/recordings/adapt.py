@@ -190,9 +190,8 @@ def averaged(record: Dataset, period: float, revolutions: int | None = None) -> 
         if key in own or (key not in told and record.unit(key) == "s"):
             continue
         average = revolution_average(time[index], values[index], period, revolutions)
-        turns = average.per_revolution
-        if average.mean and turns and max(turns) - min(turns) > 0.02 * abs(average.mean):
-            scatter[key] = (max(turns) - min(turns)) / abs(average.mean)
+        if average.unlike:
+            scatter[key] = average.unlike
         if average.problem:
             problems.setdefault(average.problem, []).append(key)
         if average.mean is not None:

@@ -36,8 +36,6 @@ SEVERAL = (
 )
 WALLS = "yPlus.dat"
 """What the function object yPlus of OpenFOAM writes: no load, but how fine the first cell is."""
-SCATTERED = 0.02
-"""Spread of the means of single revolutions above which a load is not periodic. [1]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,8 +189,7 @@ def settled(
             return found.problem
         turns = np.array(found.per_revolution)
         scatter = float(np.std(turns, ddof=1) / math.sqrt(turns.size)) if turns.size > 1 else 0.0
-        wide = (np.ptp(turns) / abs(found.mean) if turns.size and found.mean else 0.0) > SCATTERED
-        over = found.span + ("; revolutions differ by more than 2 %" if wide else "")
+        over = found.span + ("; revolutions differ by more than 2 %" if found.unlike else "")
         if found.drift is None:
             over += ", with none before it: nothing says that it has settled"
         drift = math.nan if found.drift is None else found.drift * found.mean

@@ -53,8 +53,11 @@ def import_file(path: str | os.PathLike[str], format: str | None = None, choice:
     name = os.fspath(path)
     if (Path(path) / "case.toml").is_file():
         raise InputError(Fault(name, "", "a folder with a case", "a recording", "`bemt sweep` solves cases"))
-    if format is None and Path(path).is_dir() and (inside := _run_in(Path(path))) is not None:
-        return inside if isinstance(inside, Dataset) else cfd_run.assemble(inside, Path(), name)
+    if format is None and Path(path).is_dir():
+        if (Path(path) / "run.toml").is_file():
+            return import_file(Path(path) / "run.toml")
+        if (run := cfd_run.run_at(name)) is not None:
+            return run
     kind = importers.detect(path) if format is None else format
     try:
         found = importers.read(path, kind)
@@ -82,14 +85,6 @@ def _finished(record: Dataset, choice: Choice) -> Dataset:
         note = "mean over all rows, including start-up; give --rpm or --period-s for whole revolutions"
         record = replace(record, notes=(*record.notes, note))
     return replace(record, notes=(*record.notes, *_unsettled(record)))
-
-
-def _run_in(folder: Path) -> Dataset | RunToml | None:
-    """CFD run of a folder: its run.toml, else all exports in it; None where it has neither."""
-    if (folder / "run.toml").is_file():
-        return import_file(folder / "run.toml")
-    files = cfd_files(folder)
-    return RunToml.model_validate({"run": {"files": tuple(map(str, files))}}) if files else None
 
 
 def _unsettled(record: Dataset) -> list[str]:
@@ -305,11 +300,9 @@ def _file(
     return found
 
 
-def _reduced(record: Dataset | None) -> Dataset | str | None:
+def _reduced(record: Dataset) -> Dataset | str | None:
     """Steady points of a recording."""
-    if record is None or not is_recording(record, "adapted" in record.provenance):
-        return None
-    return reduction_of(record)
+    return reduction_of(record) if is_recording(record, "adapted" in record.provenance) else None
 
 
 def _means(record: Dataset, reduced: Dataset | str | None) -> Mapping[str, Mean]:

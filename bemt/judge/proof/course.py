@@ -52,6 +52,12 @@ class Course:
         used = np.cumsum([0, *(step != MODEL for step in self.steps)])
         return int(np.count_nonzero(used[: len(self.answers)] <= runs)) - 1
 
+    def named(self, at: int | None = None) -> list[str]:
+        """Causes that were named up to an answer, all by default, in order."""
+        last = (self.answers if at is None else self.answers[: at + 1])[-1:]
+        said = [*self.aside[:at], *(a.effects for a in last if a.verdict in DONE)]
+        return list(dict.fromkeys(n for some in said for n in some))
+
 
 class After(Documented):
     """What was found after so many runs, each of how many, and the time of the stand [min]."""
@@ -97,9 +103,7 @@ class Loop(Documented):
 
 def _named(entry: Entry, course: Course, at: int) -> list[str]:
     """What a course has named up to an answer; of names for one cause, which the plan cannot tell apart, one."""
-    last = course.answers[at]
-    said = [*(n for some in course.aside[:at] for n in some), *(last.effects if last.verdict in DONE else ())]
-    names = list(dict.fromkeys(said))
+    names = course.named(at)
     allowed = entry.allowed
     if not all(any(n in a for a in allowed) for n in names):
         return names

@@ -56,20 +56,19 @@ class Limits(Documented):
         'rpm is no number'
         """
         for name in _WATCHED:
-            if name in row and not math.isfinite(row[name]):
+            value, limit = row.get(name, 0.0), getattr(self, name, math.inf)
+            what, _, unit = name.partition("_")
+            if not math.isfinite(value):
                 return f"{name} is no number"
-        for name, limit in (("current_A", self.current_A), ("vibration_m_s2", self.vibration_m_s2), ("rpm", self.rpm)):
-            if abs(row.get(name, 0.0)) > limit:
-                what, _, unit = name.partition("_")
-                return f"{what} {row[name]:.4g} {unit.replace('m_s2', 'm/s2')}".strip() + f" above {limit:.4g}"
+            if abs(value) > limit:
+                return f"{what} {value:.4g} {unit.replace('m_s2', 'm/s2')}".strip() + f" above {limit:.4g}"
         return ""
 
 
 class Order(Documented):
-    """A line to the guard: a pulse width to go to [us], a reason to stop, or, with neither, a sign of life."""
+    """A line to the guard: a pulse width to go to [us], or, without one, a sign of life."""
 
     go: float | None = None
-    stop: str = ""
 
 
 class Word(Documented):
@@ -96,8 +95,6 @@ class Guard:
     def order(self, said: Order) -> None:
         """Take an order."""
         self.beat = time.monotonic()
-        if said.stop:
-            self.stop(said.stop)
         if said.go is not None and not self.stopped:
             self.target = min(max(said.go, self.limits.stop_us), self.limits.largest_us)
 
@@ -112,8 +109,8 @@ class Guard:
         try:
             self.wire.write(self.us)
         except OSError as error:
-            if not self.stopped:
-                self.stopped, self.us, self.target = f"wire lost: {error}", self.limits.stop_us, self.limits.stop_us
+            self.stopped = self.stopped or f"wire lost: {error}"
+            self.us = self.target = self.limits.stop_us
         self.written = time.monotonic()
 
     def tick(self) -> None:
@@ -144,13 +141,14 @@ class Guard:
         return Word(self.then, self.us, self.row if self.fresh == self.then else {}, self.stopped)
 
 
-def _orders(into: queue.SimpleQueue[Order | None]) -> None:
-    for line in sys.stdin:
-        try:
-            into.put(Order.from_document(json.loads(line)))
-        except (ValueError, TypeError):
-            into.put(Order(stop="an order that cannot be read"))
-    into.put(None)
+def _hear(orders: queue.SimpleQueue[Order | str]) -> None:
+    """Put orders into a queue; the last is a word, why there are no more."""
+    try:
+        for line in sys.stdin:
+            orders.put(Order.from_document(json.loads(line)))
+        orders.put("the orders ended")
+    except (ValueError, TypeError):
+        orders.put("an order that cannot be read")
 
 
 def _tell(said: Word) -> None:
@@ -173,20 +171,21 @@ def main() -> None:
     except InputError as error:
         _tell(Word(time.monotonic(), limits.stop_us, refused=tuple(vars(f) for f in error.faults)))
         return
-    signal.signal(signal.SIGTERM, lambda *_: guard.stop("terminated"))
-    orders: queue.SimpleQueue[Order | None] = queue.SimpleQueue()
-    threading.Thread(target=_orders, args=(orders,), daemon=True).start()
+    orders: queue.SimpleQueue[Order | str] = queue.SimpleQueue()
+    signal.signal(signal.SIGTERM, lambda *_: orders.put("terminated"))
+    threading.Thread(target=_hear, args=(orders,), daemon=True).start()
     end = math.inf
     try:
         while time.monotonic() < end:
             while not orders.empty():
                 said = orders.get()
-                guard.order(said or Order(stop="the orders ended"))
-                end = end if said else time.monotonic() + _LINGER_S
+                if isinstance(said, Order):
+                    guard.order(said)
+                else:
+                    guard.stop(said)
+                    end = min(end, time.monotonic() + _LINGER_S)
             guard.tick()
             _tell(guard.told())
-            if guard.stopped == "terminated":
-                end = min(end, time.monotonic() + _LINGER_S)
             time.sleep(limits.tick_s)
     finally:
         guard.stop("the guard failed")

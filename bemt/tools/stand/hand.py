@@ -7,7 +7,7 @@ import importlib.util
 import json
 import subprocess
 import sys
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -25,11 +25,11 @@ Rows = Sequence[Mapping[str, float]]
 # Of a simulated stand that nobody watches
 _LAPSE, _LIMITS = 300.0, Limits(2000.0, 500.0, current_A=5e3, vibration_m_s2=50.0)
 _LOADS = ("thrust_N", "torque_Nm")
-_READ = ("airspeed_m_s", "voltage_V")  # Channels of the wire that go into a recording, beside speed and loads
+_READ = ("rpm", *_LOADS, "airspeed_m_s", "voltage_V")  # Channels of the wire that go into a recording
 
 
-class Wired(ABC):
-    """Hand of a stand behind a wire (:class:`bemt.judge.proof.loop.Hand`), and the person who stands there."""
+class Wired(Hand):
+    """Hand of a stand behind a wire, and the person who stands there."""
 
     stand: Stand
     keep = ""  # Folder for every run
@@ -46,17 +46,7 @@ class Wired(ABC):
     def place(self, row: Mapping[str, float]) -> Mapping[str, float]:
         """Bring wind and wall to a row; what is known of it beside what the wire reads."""
 
-    @abstractmethod
-    def there(self, name: str) -> bool:
-        """Look whether a cause is at work."""
-
-    @abstractmethod
-    def mend(self, names: Sequence[str]) -> Sequence[str]:
-        """Put causes right; those that were there."""
-
-    def measured(
-        self, kind: str, runs: Sequence[Points] = (), mended: Sequence[str] = (), day: int = 0
-    ) -> str:  # fmt: skip
+    def measured(self, kind: str, runs: Sequence[Points] = (), mended: Sequence[str] = (), day: int = 0) -> str:
         """Make a run: means, and the scatter of a sample as their uncertainty."""
         rows, out = self.set_up(kind, runs, mended, day), list[dict[str, float]]()
         if not rows or max(r["rpm"] for r in rows) > self.stand.limits.rpm or not self.may(kind, rows):
@@ -65,9 +55,10 @@ class Wired(ABC):
             known = self.stand.meanwhile(partial(self.place, row))
             read = self.stand.at_speed(row["rpm"])
             told = {"run": 0, "time_s": read.seconds, **known}
-            told |= {n: read.mean[n] for n in ("rpm", *_LOADS, *_READ) if n in read.mean}
+            told |= {n: read.mean[n] for n in _READ if n in read.mean}
             told |= {f"u_{n}": read.scatter[n] for n in _LOADS if n in read.mean}
-            out.append({n: v for n, v in told.items() if n != "k"})  # the simulated stand's own count
+            told.pop("k", None)  # the simulated stand's own count
+            out.append(told)
         self.stand.stop()
         if len(out) < 2:
             return ""
@@ -85,26 +76,24 @@ class Simulated(Wired):
         super().__init__()
         command = [sys.executable, "-m", "bemt.tools.stand.simulated", str(key), item, wire, str(lapse)]
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        self.wire, self.address = wire, str(self._line()["address"])
+        self.wire, self.address = wire, self._told()
 
-    def _line(self) -> dict[str, Any]:
+    def _told(self) -> Any:
         assert self.process.stdout is not None
-        line = self.process.stdout.readline()
-        if not line:
-            raise RuntimeError("the simulated stand ended")
-        said: dict[str, Any] = json.loads(line)
-        return said
+        if line := self.process.stdout.readline():
+            return json.loads(line)
+        raise RuntimeError("the simulated stand ended")
 
     def ask(self, do: str, **more: Any) -> Any:
         """Do something at the stand."""
         assert self.process.stdin is not None
         self.process.stdin.write(json.dumps({"do": do, **more}) + "\n")
         self.process.stdin.flush()
-        return self._line()["done"]
+        return self._told()
 
     def set_up(self, kind: str, runs: Sequence[Points], mended: Sequence[str], day: int) -> Any:
         """Prepare a run; its rows."""
-        return self.ask("set up", kind=kind, runs=[[dict(p) for p in r] for r in runs], mended=list(mended), day=day)
+        return self.ask("set up", kind=kind, runs=runs, mended=mended, day=day)
 
     def place(self, row: Mapping[str, float]) -> Mapping[str, float]:
         """Bring wind and wall to a row."""
@@ -113,11 +102,11 @@ class Simulated(Wired):
 
     def there(self, name: str) -> bool:
         """Look whether a cause is at work."""
-        return bool(self.ask("look", name=name))
+        return bool(self.ask("at work", names=[name]))
 
-    def mend(self, names: Sequence[str]) -> Sequence[str]:
+    def mend(self, names: Sequence[str]) -> Any:
         """Put causes right; those that were there."""
-        return [str(n) for n in self.ask("mend", names=list(names))]
+        return self.ask("at work", names=names)
 
     def close(self) -> None:
         """End the process."""

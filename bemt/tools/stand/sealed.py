@@ -43,9 +43,7 @@ def bench_of(folder: Path, item: str) -> tuple[Bench, Entry]:
         told = json.loads((folder / _POINTS).read_text("utf-8"))
         rig = rig_of(load_case(told["case"]), told["top_rpm"])
         return Bench(rig, entry.plan, rows_of(told["points"])), entry
-    first, _ = np.random.SeedSequence(int(key.seed)).spawn(2)
-    found = {(b.rig.name, b.plan): b for b in prove.benches(prove.SIZES[key.size], first)}
-    return found[entry.rig, entry.plan], entry
+    return prove.benches_of(key)[entry.rig, entry.plan], entry
 
 
 def seal_case(

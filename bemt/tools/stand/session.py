@@ -8,7 +8,7 @@ import secrets
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,7 +35,6 @@ from bemt.tools.stand.verbs import Stand, Stopped
 if TYPE_CHECKING:
     from bemt.rotors.propeller import Propeller
 
-SCHEMA = "bemt.stand/1"
 _ARMING_S = 3.0  # At the stop value, until a controller takes commands
 _ABOVE = 1.1  # Speed at which the motor is stopped, over the top of the range [1]
 _UP, _WINDS = 10, 5  # Speeds of a plan at rest, and winds of one in a tunnel
@@ -57,7 +56,7 @@ class StandAnswer(Answered):
     stopped: str = ""  # Why the guard stopped it
     there: tuple[str, ...] | None = None  # What was sealed, of a simulated stand
     files: tuple[Path, ...] = ()
-    lines: tuple[str, ...] = field(default=(), repr=False)
+    details: str = field(default="", repr=False)  # The log
 
     @property
     def exit_code(self) -> int:
@@ -67,28 +66,21 @@ class StandAnswer(Answered):
     @property
     def found(self) -> tuple[str, ...]:
         """Causes that were named, in order."""
-        last = self.course.answers[-1:] if self.course.answers else []
-        said = [n for some in self.course.aside for n in some]
-        return tuple(dict.fromkeys([*said, *(n for a in last if a.verdict in ("named", "sensor") for n in a.effects)]))
+        return tuple(self.course.named())
 
     @property
     def text(self) -> str:
         """What came of it; the rest was told while it happened."""
-        told = [line for line in self.lines if line.startswith(("stopped: ", "found: ", "unsealed: "))]
+        told = [line for line in self.details.split("\n") if line.startswith(("stopped: ", "found: ", "unsealed: "))]
         return "\n".join([*told, *(f"story: {f.as_posix()}" for f in self.files if f.suffix == ".html")])
-
-    @property
-    def details(self) -> str:
-        """The story in lines."""
-        return "\n".join(self.lines)
 
     def _document(self) -> dict[str, Any]:
         """Plain values of schema ``bemt.stand/1``."""
-        return {"schema": SCHEMA, "case": self.case, "found": list(self.found), "stopped": self.stopped,
-                "there": None if self.there is None else list(self.there), "end": self.course.end,
-                "steps": list(self.course.steps), "minutes": list(self.course.minutes),
-                "answers": [{"verdict": a.verdict, "effects": list(a.effects), "probability": a.sure}
-                            for a in self.course.answers]}  # fmt: skip
+        c = self.course
+        answers = [{"verdict": a.verdict, "effects": a.effects, "probability": a.sure} for a in c.answers]
+        return {"schema": "bemt.stand/1", "case": self.case, "found": self.found, "stopped": self.stopped,
+                "there": self.there, "end": c.end, "steps": c.steps, "minutes": c.minutes,
+                "answers": answers}  # fmt: skip
 
 
 def ask(question: str) -> str:
@@ -120,7 +112,7 @@ class AtTheTerminal(Wired):
 
     def set_up(self, kind: str, runs: Sequence[Points], mended: Sequence[str], day: int) -> Rows:
         """Ask for what a run needs; no rows where it cannot be."""
-        rows = [dict(p) for p in (runs[-1] if kind == "run" else self.points)]
+        rows = runs[-1] if kind == "run" else self.points
         if max(r["airspeed_m_s"] for r in rows) > self.wind or max(r["rpm"] for r in rows) > self.stand.limits.rpm:
             return []
         need = "the rotor and the stand as they were before, without what is suspected" if kind == "reference" else ""
@@ -224,7 +216,7 @@ def sit(
     log.planned(points, case)
     hand: Wired
     with ExitStack() as held:
-        limits = _limits(rotor, on, given, top_rpm, lapse)
+        limits = _limits(rotor, on, given, top, lapse)
         if on == "simulated":
             own = secrets.randbits(40) if seed is None else seed
             digest = sealed.seal_case(out / "sealed", load_case(case), points, top, faults, own)
@@ -246,15 +238,15 @@ def sit(
         except Stopped as error:
             log.stop(str(error))
     there = sealed.bench_of(out / "sealed", "0000")[1].causes if on == "simulated" else None
-    answer = StandAnswer(rotor.name, log.course, log.stopped, there)
     spent = sum(log.course.minutes) + minutes("run", len(points))
     end = log.stopped or log.course.end or "no run"
-    log.tell(f"found: {_found(answer)}; ended by: {end}; {spent:.0f} min of stand time")
+    log.tell(f"found: {_found(log.course)}; ended by: {end}; {spent:.0f} min of stand time")
     if there is not None:
         log.tell(f"unsealed: there was {', '.join(there) or 'nothing wrong'}")
+    files = out / "stand.json", out / "log.txt", *write_story(out, rotor, log.course, hand.made, log.lines)
+    answer = StandAnswer(rotor.name, log.course, log.stopped, there, files, "\n".join(log.lines))
     write_atomic(out / "stand.json", json_text(answer.to_dict()))
-    files = write_story(out, rotor, answer.course, hand.made, log.lines)
-    return replace(answer, files=(out / "stand.json", out / "log.txt", *files), lines=tuple(log.lines))
+    return answer
 
 
 def _diagnosed(out: Path, question: list[str], hand: Wired, runs: int, log: _Log) -> None:
@@ -266,19 +258,17 @@ def _diagnosed(out: Path, question: list[str], hand: Wired, runs: int, log: _Log
     log.course = follow(out, first, hand, runs, enough=A_RUN, tell=log.told, words=question)
 
 
-def _found(answer: StandAnswer) -> str:
+def _found(course: Course) -> str:
     """What was found, and what was left open."""
-    last = answer.course.answers[-1] if answer.course.answers else None
-    if last is None:
+    if not course.answers:
         return "nothing, as nothing was measured"
+    last, found = course.answers[-1], course.named()
     left = {"class": f"one of {', '.join(last.effects)}", "none": "nothing wrong", "insufficient": "not settled",
             "unknown": "something that is not in the library"}.get(last.verdict, "")  # fmt: skip
-    return ", ".join([*answer.found, *([left] if left and (not answer.found or last.verdict == "class") else [])])
+    return ", ".join([*found, *([left] if left and (not found or last.verdict == "class") else [])])
 
 
-def _limits(
-    rotor: Propeller, on: str, given: Mapping[str, float | None], top_rpm: float | None, lapse: float
-) -> Limits:  # fmt: skip
+def _limits(rotor: Propeller, on: str, given: Mapping[str, float | None], top_rpm: float, lapse: float) -> Limits:
     """Limits as given, from the case, or asked for."""
     drive = rotor.case.file.drive
     found = {n: v for n, v in given.items() if v is not None and n not in _AIR}
@@ -289,7 +279,7 @@ def _limits(
         found = {**_SIMULATED, **found}
     else:
         found |= {name: asked(name, found) for name in ("largest_us", "ramp_us_s", "current_A")}
-    limits = Limits(**found, rpm=_ABOVE * (top_rpm or rotor.case.rpm))
+    limits = Limits(**found, rpm=_ABOVE * top_rpm)
     if not limits.stop_us < limits.largest_us <= 2500.0 or limits.ramp_us_s <= 0.0:
         got = f"{limits.largest_us:g} us, {limits.ramp_us_s:g} us/s"
         raise InputError(Fault("", "largest_us, ramp_us_s", got, "1000 to 2500 us and a rise above 0"))
@@ -298,7 +288,6 @@ def _limits(
 
 # The story of a sitting: what was run, what was said after each run, and what was decided; HTML and a picture.
 _MOST_RUNS, _MOST = 4, 5  # Runs and explanations in a picture
-_KINDS = {"again": "recording", "run": "run", "reference": "reference"}
 
 
 def write_story(
@@ -327,11 +316,11 @@ def _drawn(rotor: Propeller, course: Course, made: Sequence[tuple[str, str]]) ->
         points = rotor.solve(rpm=rows["rpm"], airspeed_m_s=rows["airspeed_m_s"], bands=False)
         for one, name in zip(loads, ("thrust_N", "torque_Nm"), strict=True):
             share, u = (100.0 * rows[n] / np.asarray(getattr(points, name)) for n in (name, f"u_{name}"))
-            label = f"{k + 1} {_KINDS[kind]}"
+            label = f"{k + 1} {'recording' if kind == 'again' else kind}"
             one.errorbar(rows["rpm"], share - 100.0, u, fmt="o", ms=3, lw=0.8, color=CYCLE[k], label=label)
-    for one, what in zip(loads, ("thrust", "torque"), strict=True):
+            one.set(xlabel="speed [rev/min]", title=f"{name.partition('_')[0]} off the model [%]")
+    for one in loads:
         one.axhline(0.0, color=GREY, lw=0.8)
-        one.set(xlabel="speed [rev/min]", title=f"{what} off the model [%]")
     said = [{r.effect or "nothing": r.probability for r in a.ranking} for a in course.answers]
     names = list(dict.fromkeys(n for one in said for n in sorted(one, key=lambda n: -one[n])[:3]))[:_MOST]
     for k, answer in enumerate(said):

@@ -1,4 +1,4 @@
-"""The simulated stand as a process of its own: ``python -m bemt.tools.stand.simulated KEY ITEM WIRE [LAPSE]``.
+"""The simulated stand as a process of its own: ``python -m bemt.tools.stand.simulated KEY ITEM WIRE LAPSE``.
 
 KEY is the folder of a sealed proof: what is wrong stays in this process. It answers on the wire of a real stand, so
 that the driver and the guard are those of a real one: ``flightstand`` (gRPC), ``rcbenchmark`` (UDP) or ``serial`` (a
@@ -14,14 +14,15 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from concurrent import futures
 from pathlib import Path
 from typing import Any
 
 from bemt.base.errors import needs
-from bemt.base.units import KGF, RPM
+from bemt.base.units import KGF
 from bemt.judge.proof.live import Truth
+from bemt.tools.stand.drivers import flightstand
 from bemt.tools.stand.sealed import bench_of
 
 _WATCH_S, _SEND_S = 0.02, 0.01
@@ -31,19 +32,15 @@ def _flightstand(truth: Truth) -> str:
     """Serve the core's calls that the client makes."""
     needs("FlightStand", "stand")
     grpc, fs, calls = (needs(m, "stand") for m in ("grpc", "flight_stand_api_v1_pb2", "flight_stand_api_v1_pb2_grpc"))
-    kinds = {"thrust_N": (fs.FORCE_FZ, 1.0), "torque_Nm": (fs.TORQUE_MZ, 1.0),
-             "current_A": (fs.CURRENT_HALL_CURRENT, 1.0), "rpm": (fs.ROTATION_SPEED_FREQUENCY, RPM),
-             "airspeed_m_s": (fs.AIRSPEED_DIFFERENTIAL_PRESSURE, 1.0),
-             "vibration_m_s2": (fs.ACCELEROMETER_VIBRATION_LEVEL, 1.0)}  # fmt: skip
+    kinds = {ours: (getattr(fs, kind), 1.0 / f) for ours, (kind, f) in flightstand.INPUTS.items()}
 
     class Core(calls.FlightStandServicer):  # type: ignore[name-defined,misc]
         def GetServerStatus(self, request: Any, context: Any) -> Any:
             return fs.ServerStatus()
 
         def ListBoards(self, request: Any, context: Any) -> Any:
-            return fs.ListBoardsResponse(
-                boards=[fs.Board(name="/boards/1", ready=True, identification={"displayName": "bemt"})]
-            )
+            board = fs.Board(name="/boards/1", ready=True, identification={"displayName": "bemt"})
+            return fs.ListBoardsResponse(boards=[board])
 
         def ListInputs(self, request: Any, context: Any) -> Any:
             inputs = [fs.Input(name=f"/boards/1/inputs/{k}", input_type=kinds[n][0], signal_name=n)
@@ -131,16 +128,16 @@ def _talk(truth: Truth, hear: Callable[[], str], tell: Callable[[Mapping[str, fl
     def send() -> None:
         if truth.broken != "silent":
             tell(truth.sample())
-        time.sleep(_SEND_S)
 
-    _forever(listen)
-    _forever(send)
+    _forever(listen, 0.0)
+    _forever(send, _SEND_S)
 
 
-def _forever(do: Callable[[], None]) -> None:
+def _forever(do: Callable[[], None], every_s: float) -> None:
     def again() -> None:
         while True:
             do()
+            time.sleep(every_s)
 
     threading.Thread(target=again, daemon=True).start()
 
@@ -148,45 +145,36 @@ def _forever(do: Callable[[], None]) -> None:
 _WIRES = {"flightstand": _flightstand, "rcbenchmark": _rcbenchmark, "serial": _serial}
 
 
-def _by_hand(
-    truth: Truth, do: str, name: str = "", names: Sequence[str] = (), what: str = "", to: float = 1.0, **said: Any
-) -> Any:  # fmt: skip
+def _by_hand(truth: Truth, do: str, **said: Any) -> Any:
     """What a person does at the stand."""
     match do:
         case "set up":
             return truth.set_up(**said)
         case "place":
             return truth.place(**said)
-        case "look":
-            return name in truth.entry.causes
-        case "mend":
-            return [n for n in names if n in truth.entry.causes]
+        case "at work":
+            return [n for n in said["names"] if n in truth.entry.causes]
         case "output":
             return {"us": truth.us, "since": truth.changed, "now": time.monotonic()}
         case "break":
-            truth.broken = what
+            truth.broken = said["what"]
         case "lapse":
-            truth.lapse = to
+            truth.lapse = said["to"]
 
 
-def _say(**said: Any) -> None:
+def _say(said: Any) -> None:
     sys.stdout.write(json.dumps(said) + "\n")
     sys.stdout.flush()
 
 
 def main() -> None:
     """Serve one item of a sealed key until the lines end."""
-    key, item, wire, *more = sys.argv[1:]
-    truth = Truth(*bench_of(Path(key), item), float(more[0]) if more else 1.0)
-    _say(address=_WIRES[wire](truth))
-
-    def watch() -> None:
-        truth.watch()
-        time.sleep(_WATCH_S)
-
-    _forever(watch)
+    key, item, wire, lapse = sys.argv[1:]
+    truth = Truth(*bench_of(Path(key), item), float(lapse))
+    _say(_WIRES[wire](truth))
+    _forever(truth.watch, _WATCH_S)
     for line in sys.stdin:
-        _say(done=_by_hand(truth, **json.loads(line)))
+        _say(_by_hand(truth, **json.loads(line)))
     os._exit(0)  # threads of servers
 
 

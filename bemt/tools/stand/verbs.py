@@ -14,7 +14,6 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -45,18 +44,9 @@ class SettledRow:
 
 
 class Stand(contextlib.AbstractContextManager["Stand"]):
-    """A stand behind its guard; use it in a ``with`` statement.
+    """A stand behind its guard, for a ``with`` statement: :func:`connect` on what the first three words say.
 
-    Parameters
-    ----------
-    driver, address, line : str
-        As :func:`bemt.tools.stand.drivers.connect` takes them.
-    limits : Limits
-        What the stand may do.
-    settle_s : float
-        Longest wait until a command has come and the speed is steady. [s]
-    samples : int
-        Samples of a row.
+    ``settle_s`` is the longest wait [s] until a command has come and the speed is steady; ``samples`` make a row.
     """
 
     def __init__(
@@ -70,33 +60,30 @@ class Stand(contextlib.AbstractContextManager["Stand"]):
         command = [sys.executable, "-m", "bemt.tools.stand.guard"]
         self.guard = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
                                       start_new_session=True, stderr=subprocess.DEVNULL)  # fmt: skip
+        assert self.guard.stdin is not None and self.guard.stdout is not None
+        self._orders, self._words = self.guard.stdin, self.guard.stdout
         self._say([driver, address, line, limits.document()])
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()
         atexit.register(self.close)
-        while not self._rows:  # the guard tells of the wire, or it ends
-            if self._refused or self.stopped:
-                why = Stopped(self.stopped)
-                self.close()
-                raise InputError([Fault(**f) for f in self._refused]) if self._refused else why
+        while not self._rows and not self.stopped:  # the guard tells of the wire, or it ends
             time.sleep(_POLL_S)
+        if not self._rows:
+            self.close()
+            raise InputError(Fault(**f) for f in self._refused) if self._refused else Stopped(self.stopped)
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     def _say(self, said: Any) -> None:
-        pipe = self.guard.stdin
-        if pipe is None or pipe.closed:
-            return
         try:
-            pipe.write(json.dumps(said) + "\n")
-            pipe.flush()
-        except (BrokenPipeError, OSError):
+            self._orders.write(json.dumps(said) + "\n")
+            self._orders.flush()
+        except (OSError, ValueError):  # the pipe is broken, or closed
             self.stopped = self.stopped or "the guard is gone"
 
     def _listen(self) -> None:
-        assert self.guard.stdout is not None
-        for text in self.guard.stdout:
+        for text in self._words:
             if not text.startswith("{"):  # words of a client
                 continue
             said = Word.from_document(json.loads(text))
@@ -105,14 +92,9 @@ class Stand(contextlib.AbstractContextManager["Stand"]):
             if said.row:
                 self._rows.append((said.at, said.us, said.row))
         self.stopped = self.stopped or "the guard is gone"
-        if self.guard.stdin is not None and not self.guard.stdin.closed and not self._refused:
-            self._panic()  # killed: nobody else can reach the stand
-
-    def _panic(self) -> None:
-        with contextlib.suppress(Exception):
-            wire = connect(*self.wire)
-            wire.write(self.limits.stop_us)
-            wire.close()
+        if not self._orders.closed and not self._refused:  # killed: nobody else can reach the stand
+            with contextlib.suppress(Exception), contextlib.closing(connect(*self.wire)) as wire:
+                wire.write(self.limits.stop_us)
 
     def rest(self, seconds: float) -> None:
         """Wait with a beat; raises as soon as the guard has stopped."""
@@ -121,8 +103,7 @@ class Stand(contextlib.AbstractContextManager["Stand"]):
             self._say({})
             if self.stopped:
                 raise Stopped(self.stopped)
-            left = until - time.monotonic()
-            if left <= 0.0:
+            if (left := until - time.monotonic()) <= 0.0:
                 return
             time.sleep(min(left, _POLL_S))
 
@@ -166,7 +147,6 @@ class Stand(contextlib.AbstractContextManager["Stand"]):
     def at_speed(self, rpm: float) -> SettledRow:
         """Find the pulse width of a speed from what was read so far, and read a row there. [rev/min]"""
         low, high = self.limits.stop_us, self.limits.largest_us
-        row = None
         for _ in range(_TRIES):
             speeds, widths = zip(*sorted((n, us) for us, n in {low: 0.0, **self.known}.items()), strict=True)
             if rpm < speeds[-1]:
@@ -181,7 +161,6 @@ class Stand(contextlib.AbstractContextManager["Stand"]):
             self.known[us] = row.mean["rpm"]
             if abs(row.mean["rpm"] / rpm - 1.0) < _NEAR or us >= high:
                 break
-        assert row is not None
         return row
 
     def stop(self) -> None:
@@ -193,11 +172,10 @@ class Stand(contextlib.AbstractContextManager["Stand"]):
     def close(self) -> None:
         """Stop for good and let go of the stand."""
         atexit.unregister(self.close)
-        if self.guard.stdin is not None and not self.guard.stdin.closed:
-            with contextlib.suppress(OSError):
-                self.guard.stdin.close()  # the guard stops at the end of its orders
+        with contextlib.suppress(OSError):
+            self._orders.close()  # the guard stops at the end of its orders
         with contextlib.suppress(subprocess.TimeoutExpired):
             self.guard.wait(5.0)
         self._listener.join(5.0)
-        if self.guard.stdout is not None and not self._listener.is_alive():
-            self.guard.stdout.close()
+        if not self._listener.is_alive():
+            self._words.close()

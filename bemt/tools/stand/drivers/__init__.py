@@ -33,33 +33,18 @@ class Wire(Protocol):
 
     def write(self, pulse_us: float) -> None:
         """Set the pulse width. [us]"""
-        ...
 
     def read(self) -> dict[str, float]:
         """Give the latest row: thrust_N, torque_Nm, rpm, what else there is, and stamp_s of the other end's clock."""
-        ...
 
     def close(self) -> None:
         """Let go of the wire."""
-        ...
 
 
 def connect(driver: str, address: str = "", line: str = "") -> Wire:
-    """Open a wire, and wait for the first row.
+    """Open a wire at an address, by default that of :data:`DEFAULTS`, and wait for the first row.
 
-    Parameters
-    ----------
-    driver : str
-        One of :data:`DEFAULTS`.
-    address : str
-        Where the stand is; :data:`DEFAULTS` where it is empty.
-    line : str
-        Format of a serial line.
-
-    Raises
-    ------
-    InputError
-        For an address where nothing answers, and for a library that is missing.
+    ``line`` is the format of a serial line. InputError where nothing answers, and for a library that is missing.
     """
     address = address or DEFAULTS[driver]
     driven = importlib.import_module(f"bemt.tools.stand.drivers.{driver}")

@@ -12,17 +12,17 @@ import math
 from typing import Any
 
 from bemt.base.errors import needs
+from bemt.base.units import RPM
 from bemt.tools.stand import drivers
 from bemt.tools.stand.drivers import parts, silent
 
 ROWS = "samples of the Flight Stand program"
-# Their type of an input, our channel, factor to ours. The airspeed is taken to be in m/s (SI, as they say of all).
-_INPUTS = (
-    ("FORCE_FZ", "thrust_N", 1.0), ("TORQUE_MZ", "torque_Nm", 1.0),
-    ("ROTATION_SPEED_FREQUENCY", "rpm", 60.0 / (2.0 * math.pi)), ("CURRENT_HALL_CURRENT", "current_A", 1.0),
-    ("VOLTAGE_HV_INPUT", "voltage_V", 1.0), ("ACCELEROMETER_VIBRATION_LEVEL", "vibration_m_s2", 1.0),
-    ("AIRSPEED_DIFFERENTIAL_PRESSURE", "airspeed_m_s", 1.0),
-)  # fmt: skip
+INPUTS = {
+    "thrust_N": ("FORCE_FZ", 1.0), "torque_Nm": ("TORQUE_MZ", 1.0), "rpm": ("ROTATION_SPEED_FREQUENCY", 1.0 / RPM),
+    "current_A": ("CURRENT_HALL_CURRENT", 1.0), "voltage_V": ("VOLTAGE_HV_INPUT", 1.0),
+    "vibration_m_s2": ("ACCELEROMETER_VIBRATION_LEVEL", 1.0), "airspeed_m_s": ("AIRSPEED_DIFFERENTIAL_PRESSURE", 1.0),
+}  # fmt: skip
+"""Their type of an input and its factor to our channel. The airspeed is taken to be in m/s (SI, as they say of all)."""
 
 
 class _Core:
@@ -30,27 +30,27 @@ class _Core:
         self.core, self.lost, kind = core, lost, core.Proto
         self.mask = needs("google.protobuf.field_mask_pb2", "stand").FieldMask(paths=["output_target"])
         self.esc = core.find_output_by_type(kind.ESC)
-        found = [(core.find_input_by_type(getattr(kind, theirs)), ours, f) for theirs, ours, f in _INPUTS]
+        found = ((core.find_input_by_type(getattr(kind, type_)), ours, f) for ours, (type_, f) in INPUTS.items())
         self.signals = {i.signal_name: (ours, f) for i, ours, f in found if i is not None}
+
+    def _call(self, method: str, request: Any, failure: str) -> Any:
+        try:
+            return getattr(self.core.stub, method)(request, timeout=drivers.PATIENCE_S)
+        except self.lost as error:
+            raise OSError(f"the core {failure}: {error.details()}") from error  # type: ignore[attr-defined]
 
     def write(self, pulse_us: float) -> None:
         self.esc.output_target.active, self.esc.output_target.target_value = True, pulse_us
         request = self.core.Proto.UpdateOutputRequest(output=self.esc, mask=self.mask)
-        try:
-            self.core.stub.UpdateOutput(request, timeout=drivers.PATIENCE_S)
-        except self.lost as error:
-            raise OSError(f"the core did not take the command: {error.details()}") from error  # type: ignore[attr-defined]
+        self._call("UpdateOutput", request, "did not take the command")
 
     def read(self) -> dict[str, float]:
-        try:
-            told = self.core.stub.ListSamples(self.core.Proto.ListSamplesRequest(), timeout=drivers.PATIENCE_S)
-        except self.lost as error:
-            raise OSError(f"the core sent no samples: {error.details()}") from error  # type: ignore[attr-defined]
+        told = self._call("ListSamples", self.core.Proto.ListSamplesRequest(), "sent no samples")
         row, stamp = {}, 0.0
         for sample in told.sample_group.samples:
             if sample.signal_name in self.signals:
                 name, factor = self.signals[sample.signal_name]
-                row[name] = sample.value * factor if sample.active else float("nan")
+                row[name] = sample.value * factor if sample.active else math.nan
                 stamp = max(stamp, sample.sample_time.ToNanoseconds() * 1e-9)
         return {**row, "stamp_s": stamp}
 

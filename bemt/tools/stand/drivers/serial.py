@@ -27,12 +27,10 @@ def read_format(line: str) -> tuple[str, re.Pattern[str], list[tuple[str, float]
     ('S1200', True, ('rpm', 1.0))
     """
     out, arrow, back = line.partition(" -> ")
-    names = re.findall(r"\{(\w+)\}", back)
-    faults = []
+    faults, channels = [], []
     if not arrow or out.count("{pulse_us}") != 1:
         faults.append(Fault("", "line", repr(line), f"a command with {{pulse_us}}, an arrow, a row, as in {LINE}"))
-    channels = []
-    for name in names:
+    for name in re.findall(r"\{(\w+)\}", back):
         what, _, unit = name.partition("_")
         known = factor(what, unit or what) if what in CHANNELS else math.nan
         if math.isnan(known):
@@ -49,9 +47,9 @@ def read_format(line: str) -> tuple[str, re.Pattern[str], list[tuple[str, float]
 
 
 class _Line:
-    def __init__(self, port: Any, line: str) -> None:
-        self.port, self.text, self.row = port, "", dict[str, float]()
-        self.command, self.pattern, self.channels = read_format(line)
+    def __init__(self, port: Any, command: str, pattern: re.Pattern[str], channels: list[tuple[str, float]]) -> None:
+        self.port, self.command, self.pattern, self.channels = port, command, pattern, channels
+        self.text, self.row = "", dict[str, float]()
 
     def write(self, pulse_us: float) -> None:
         self.port.write(self.command.format(pulse_us=round(pulse_us)).encode() + b"\n")
@@ -60,7 +58,7 @@ class _Line:
         waiting = self.port.in_waiting
         self.text += self.port.read(waiting).decode("ascii", "replace") if waiting else ""
         *lines, self.text = self.text[-_LONGEST:].split("\n")
-        for found in filter(None, (self.pattern.fullmatch(one.strip()) for one in lines)):
+        for found in filter(None, map(self.pattern.fullmatch, map(str.strip, lines))):
             row = {name: float(v) * f for (name, f), v in zip(self.channels, found.groups(), strict=True)}
             self.row = {**row, "stamp_s": row.get("stamp_s", time.monotonic())}
         return self.row
@@ -72,9 +70,9 @@ class _Line:
 def connect(address: str, line: str) -> _Line:
     """Open device@baud."""
     device, baud = parts(address, r"(\S+)@(\d+)", "device@baud, such as /dev/ttyUSB0@115200")
-    read_format(line or LINE)
+    form = read_format(line or LINE)
     serial = needs("serial", "stand")
     try:
-        return _Line(serial.serial_for_url(device, int(baud), timeout=0.0, write_timeout=0.2), line or LINE)
+        return _Line(serial.serial_for_url(device, int(baud), timeout=0.0, write_timeout=0.2), *form)
     except serial.SerialException as error:
         raise InputError(Fault("", "address", f"{address}: {error}", "a serial device that can be opened")) from error
