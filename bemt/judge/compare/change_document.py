@@ -29,7 +29,7 @@ from bemt.judge.compare.recordings import (
 )
 from bemt.judge.compare.selection import Invocation
 from bemt.judge.compare.smooth_change import Ratio
-from bemt.judge.explanation import Explanation, Size
+from bemt.judge.explanation import NONE, UNKNOWN, Explanation, Size
 from bemt.judge.loss import SPREAD, checks_by_worth, minutes, ways
 
 AIR_OF_BOTH = "--air-a TEMPERATURE,PRESSURE --air-b TEMPERATURE,PRESSURE"
@@ -106,8 +106,9 @@ def _lacking(change: RunChange, asked: Invocation) -> tuple[str, str] | None:
         others = f" (the file has {', '.join(columns[:4])})" if columns else ""
         text = f"choose the rows of {letter.upper()} in which nothing else changes{others}"
         return text, asked.with_rows(letter, columns[0] if columns else "COLUMN")
-    likely = {k: p for k, p in said.probability.items() if k not in ("none", "unknown")}
-    if likely.get("air_density", 0.0) * _FIRST >= max(likely.values(), default=1.0) and _of_days(change, 0.0):
+    likely = [p for k, p in said.ranked.items() if k not in (NONE, UNKNOWN)]
+    density = said.ranked.get(Explanation.of("air_density"), 0.0)
+    if density * _FIRST >= max(likely, default=1.0) and _of_days(change, 0.0):
         return DAYS, asked.with_days()
     if "torque" not in change.loads_by_name and change.loads is said:
         text = "record torque in both runs: thrust alone cannot tell gain, air and blade apart"
@@ -200,17 +201,18 @@ def document(change: RunChange) -> ComparedRuns:
     """What is said without a case."""
     said = change.leading
     return ComparedRuns(
-        said.verdict, tuple(said.effects), said.mass, or_null(change.diameter_m),
+        said.verdict, said.effects, or_null(said.probability), or_null(change.diameter_m),
         Densities(*map(or_null, (change.a.density, change.b.density, change.density_ratio))), said.why, said.sets,
         _ranking(said),
-        {name: SubVerdict(j.verdict, tuple(j.effects), j.why, _ranking(j))
+        {name: SubVerdict(j.verdict, j.effects, j.why, _ranking(j))
          for name, j in (("loads", change.loads), ("drive", change.drive))},
         change.ratios, {"A": len(change.a), "B": len(change.b)}, change.assumed, change.notes,
     )  # fmt: skip
 
 
 def _ranking(said: Judgement) -> tuple[RankedCause, ...]:
-    return tuple(RankedCause(k, p, said.parameters.get(k, {})) for k, p in list(said.probability.items())[:12])
+    first = list(said.ranked.items())[:12]
+    return tuple(RankedCause(str(k), p, said.parameters.get(str(k), {})) for k, p in first)
 
 
 WORD = {

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
@@ -61,27 +61,20 @@ FAMILY_WORD = {
 
 
 @dataclass(frozen=True, eq=False)
-class Judgement:
-    """What is said of one sub-system."""
+class Judgement(Decision):
+    """What is said of one sub-system, with the posterior that it was made on."""
 
-    verdict: str  # none, named, sensor, class, unknown or insufficient
-    effects: tuple[str, ...]  # Of the verdict
-    probability: Mapping[str, float]  # Of every explanation, the likeliest first
-    # Effect to parameter to value, low and high (90 %) and unit, as far as it was worked out
-    parameters: Sizes = field(default_factory=dict)
-    why: str = ""  # Reason, in words
-    mass: float | None = None  # Probability of the verdict
-    sets: tuple[tuple[str, ...], ...] = ()  # Of a class, one set of effects per cause; () or one: one cause
-    ranked: Mapping[Explanation, float] = field(default_factory=dict)  # As ``probability``, by explanation
+    ranked: Mapping[Explanation, float] = field(default_factory=dict)  # Of every explanation, the likeliest first [1]
+    parameters: Sizes = field(default_factory=dict)  # Of effects, as far as they were worked out
 
     @classmethod
     def of(
         cls, said: Decision, P: Mapping[Explanation, float], parameters: Sizes | None = None
     ) -> Judgement:  # fmt: skip
-        """What a decision says, with the posterior that it was made on."""
+        """The same decision with its posterior."""
         ranked = dict(sorted(P.items(), key=lambda kv: -kv[1]))
-        words = {str(k): p for k, p in ranked.items()}
-        return cls(said.verdict, said.effects, words, parameters or {}, said.why, said.probability, said.sets, ranked)
+        return cls(**{f.name: getattr(said, f.name) for f in fields(Decision)}, ranked=ranked,
+                   parameters=parameters or {})  # fmt: skip
 
 
 @dataclass(frozen=True)

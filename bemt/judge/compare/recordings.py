@@ -52,7 +52,7 @@ ERROR_IN = ("error in ", "warning in ")
 _TOLD_DENSITY, _SURE = 0.012, 2.0
 # Torque follows thrust, where that alone is known, to this share of its change (declared).
 _BY_THRUST = 0.5
-NO_VERDICT = Judgement("insufficient", (), {}, {}, "not recorded in both")
+NO_VERDICT = Judgement("insufficient", (), NONE, math.nan, "not recorded in both")
 """Of what was not recorded in both."""
 _WIDE = 1.4
 # Thrust of a propeller of 2.3 times the diameter at one speed: no stand takes both. [1]
