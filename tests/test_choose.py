@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 import bemt
 from bemt.app.cli import main
 from bemt.base.errors import InputError
+from bemt.rotors.case.motor import NamedMotor
 from bemt.rotors.propeller import rotor_of
 from bemt.tools.design.answer import best_of_each
 from bemt.tools.design.motors_file import KnownMotor, read_motors
@@ -279,6 +281,24 @@ def test_motors_on_sale_are_named_where_their_list_is_installed() -> None:
     assert named.on_sale.empty
     with pytest.raises(InputError, match="no motor has"):
         bemt.choose(8.0, 3, motors="Nobody 9999 12345")
+
+
+def test_a_motor_is_held_against_the_amperes_and_watts_of_its_maker(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One on sale is left out; one that is given is tried, and what it takes too much is said beside it."""
+    asked: dict[str, Any] = {"thrust_N": 6.0, "cells": 3, "labels": ["11x5.5"]}
+    even = choose(**asked, kv=(700, 1500)).iloc[0]
+
+    def stock(watts: float, amperes: float) -> tuple[NamedMotor, ...]:
+        told = 1.1 * even.kv, 80.0, 0.6, even.motor_g, "a list: M", "Maker", amperes, watts
+        return (NamedMotor("M", *told),)
+
+    for watts, amperes, left in ((9e3, 900.0, 1), (60.0, 900.0, 0), (9e3, 0.85 * even.peak_A, 0)):
+        monkeypatch.setattr("bemt.tools.design.motors_file.motors_on_sale", lambda w=watts, a=amperes: stock(w, a))
+        assert len(bemt.choose(**asked, kv=(700, 1500)).on_sale) == left
+        motor = KnownMotor("M", 1.1 * even.kv, 0.08, 0.6, even.motor_g, amperes, "Maker", watts)
+        one = bemt.choose(**asked, motors=[motor])
+        unit = "" if left else "W of 60" if watts < 100.0 else "A of"
+        assert ("at full throttle" in one.table.why.iloc[0]) == (not left) and unit in one.text.splitlines()[0]
 
 
 def test_three_blades_of_a_racer_need_more_power_than_two() -> None:

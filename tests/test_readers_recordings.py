@@ -379,6 +379,22 @@ def test_a_stopped_motor_whose_load_cell_is_off_is_not_under_thrust(write: Write
     assert got.flags[12] == ("electrical_rpm is 0 under thrust",) and got.flags[13] == ("electrical_rpm is 0",)
 
 
+def test_a_motor_that_stops_under_command_is_said_once(write: Write) -> None:
+    """Steps after which nothing turns, and a cell whose zero drifts: 0 is right there, and no load is a thrust."""
+    names = ("Motor Electrical Speed (RPM)", "Current (A)", "Electrical Power (W)", "Torque (N·m)", "Thrust (gf)")
+    lines = rc_text(12).rstrip("\n").split("\n")
+    top = max(float(line.split(",")[RC_HEAD.split(",").index(names[-1])]) for line in lines[1:])
+    for k in range(10, 13):
+        cells = lines[k].split(",")
+        for name, value in zip(names, (0.0, 0.001, 0.01, 0.0, 0.09 * top), strict=True):
+            cells[RC_HEAD.split(",").index(name)] = f"{value:g}"
+        lines[k] = ",".join(cells)
+    got = rcbenchmark.read(write("\n".join(lines)))
+    (flag,) = {f for flags in got.flags for f in flags}
+    assert [len(f) for f in got.flags] == [0] * 9 + [1] * 3 and "stopped" in flag and "thrust" not in flag
+    assert sum("electrical_rpm is 0" in w for w in got.notes) == 1
+
+
 def test_signs_and_backward_time_are_reported_not_repaired(write: Write) -> None:
     text = rc_text(torque=-1.0).replace("\n3.5,", "\n-0.2,")
     got = rcbenchmark.read(write(text))

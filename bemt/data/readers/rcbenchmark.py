@@ -30,7 +30,7 @@ from bemt.data.readers import head_text, number
 from bemt.data.readers._large import NumberTable
 from bemt.data.readers.headings import heading
 from bemt.data.readers.recording import Builder
-from bemt.data.readers.samples import MISREAD, MOST_RPM_PER_V, against_load, spikes
+from bemt.data.readers.samples import MISREAD, MOST_RPM_PER_V, against_load, spikes, stopped
 from bemt.data.readers.split import SplitTable
 from bemt.physics.dataset import Dataset
 
@@ -150,7 +150,11 @@ def _speeds(build: Builder) -> None:
 def _flag_speed(build: Builder, name: str) -> None:
     """Flag values of a speed that it cannot have had."""
     v, load, volt = build.channels[name].values, build.at("thrust_N"), build.at("voltage_V")
-    zero = v == 0.0
+    zero, command = v == 0.0, build.at("pulse_width_s")
+    if command is not None:
+        halted = stopped(v, command, {k: c.values for k, c in build.channels.items()})
+        build.flag(np.flatnonzero(halted), f"{name} is 0: motor stopped under command")
+        zero &= ~halted
     if load is not None and np.any(np.isfinite(load)):
         loaded = zero & (np.abs(load) > 0.05 * np.nanmax(np.abs(load))) & ~_no_current(build)
         build.flag(np.flatnonzero(loaded), f"{name} is 0 under thrust")

@@ -223,6 +223,24 @@ def _least_absolute(A: Array, y: Array) -> Array:
     return np.asarray(curve)
 
 
+def stopped(speed: Array, command: Array, values: Mapping[str, Array]) -> NDArray[np.bool_]:
+    """Rows at which the motor stopped though the command turned it before, (N,).
+
+    The speed reads 0 there, and every load of ``values``, the current among them, is below that of all rows that turn.
+
+    >>> loads = {"thrust_N": np.array([1.0, 2.0, -0.1]), "current_A": np.array([2.0, 5.0, 0.02])}
+    >>> stopped(np.array([4e3, 6e3, 0.0]), np.array([1.2, 1.4, 1.5]), loads).tolist()
+    [False, False, True]
+    """
+    loads = [values[k] for k in ("current_A", "electrical_power_W", "thrust_N", "torque_Nm") if k in values]
+    turns = speed > 0.0
+    if not turns.any() or not values.keys() & {"current_A", "electrical_power_W"}:
+        return np.zeros(speed.size, dtype=bool)
+    low = np.all([np.abs(v) < np.fmin.reduce(np.abs(v[turns])) for v in loads], axis=0)
+    before = np.fmin.accumulate(np.where(turns, command, np.inf))
+    return np.asarray((speed == 0.0) & low & (command >= before))
+
+
 def against_load(speed: Array, load: Array) -> Array:
     """Root of a load over its speed, relative to the median of the rows, (N,); a speed is misread far from 1.
 

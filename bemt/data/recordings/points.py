@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array, middle
 from bemt.base.errors import Fault, InputError
-from bemt.data.readers.samples import MISREAD, STICKS, against_load, stuck
+from bemt.data.readers.samples import MISREAD, STICKS, against_load, stopped, stuck
 from bemt.data.recordings import plateaus
 from bemt.data.recordings.channels import LOADS, DroppedCells, file_name, lost, moves, runs_of, stated
 from bemt.physics.dataset import Dataset
@@ -152,18 +152,11 @@ def at_rest(rec: Dataset) -> NDArray[np.bool_]:
 
 
 def stalled(rec: Dataset) -> NDArray[np.bool_]:
-    """Rows at which the motor stopped though the command turned it before, (N,).
-
-    The speed reads 0 there, and every load, the current among them, is below that of all rows that turn.
-    """
-    none, speed, command = np.zeros(len(rec), dtype=bool), rec.values.get("rpm"), command_of(rec)
-    loads = [rec.values[k] for k in ("current_A", "electrical_power_W", "thrust_N", "torque_Nm") if k in rec.values]
-    turns = none if speed is None else speed > 0.0
-    if command is None or not turns.any() or not rec.values.keys() & {"current_A", "electrical_power_W"}:
-        return none
-    low = np.all([np.abs(v) < np.fmin.reduce(np.abs(v[turns])) for v in loads], axis=0)
-    before = np.fmin.accumulate(np.where(turns, command[1], np.inf))
-    return np.asarray((speed == 0.0) & low & (command[1] >= before))
+    """Rows at which the motor stopped though the command turned it before, (N,)."""
+    command, speed = command_of(rec), rec.values.get("rpm")
+    if command is None or speed is None:
+        return np.zeros(len(rec), dtype=bool)
+    return stopped(speed, command[1], rec.values)
 
 
 @dataclass(frozen=True)

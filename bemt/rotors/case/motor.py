@@ -127,6 +127,7 @@ class NamedMotor:
     source: str
     maker: str = ""
     max_current_A: float | None = None
+    max_power_W: float | None = None
 
     @property
     def keys(self) -> dict[str, float | str]:
@@ -152,14 +153,15 @@ def motors_on_sale() -> tuple[NamedMotor, ...]:
     out = []
     for file in sorted((Path(dataset_dir()) / "motors").glob("*.json")):
         one = json.loads(file.read_text(encoding="utf-8"))
-        ohm, idle, mass, most = (
+        ohm, idle, mass, most, power = (
             float(v) if isinstance(v := one.get(key), (int, float)) and v > 0 else None
-            for key in ("resistance", "io", "weight_g", "max_current")
+            for key in ("resistance", "io", "weight_g", "max_current", "max_power")
         )
         source = f"{LIST} {__version__} (Karakaya, Apache-2.0), makers' numbers: {one['id']}"
         mohm = None if ohm is None else 1e3 * ohm
         maker = str(one["manufacturer"])
-        out.append(NamedMotor(f"{maker} {one['name']}", float(one["kv"]), mohm, idle, mass, source, maker, most))
+        name = f"{maker} {one['name']}"
+        out.append(NamedMotor(name, float(one["kv"]), mohm, idle, mass, source, maker, most, power))
     return tuple(out)
 
 

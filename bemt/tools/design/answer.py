@@ -143,7 +143,7 @@ class DriveChoice(Answered):
         even = f" (an even chance from {same.kv.min():.0f})" if same.kv.min() < first.kv else ""
         lines = [
             f"Take {first.label} with {first.kv:.0f} rev/min/V{even}: {_banded(first.power_W, first.u_power_W)} W at "
-            f"{at}, {first.g_per_W:.3g} g/W"
+            f"{at}, {first.g_per_W:.3g} g/W" + (f", but it {first.why}" if first.why else "")
         ]
         least = self.good.mean_W.idxmin()
         if least != 0:
@@ -164,7 +164,9 @@ class DriveChoice(Answered):
             return ["", 'Motors on sale by name: pip install "bemt[motors]"']
         source = f"{known:,} of {LIST} (Karakaya, Apache-2.0), makers' numbers; price and stock not known"
         if self.on_sale.empty:
-            return ["", f"No motor on sale near that K_v and mass is sure to turn {first.label}: none of {source}"]
+            allowed = "within the amperes and watts of its maker"
+            lead = f"No motor on sale near that K_v and mass is sure to turn {first.label} {allowed}"
+            return ["", f"{lead}: none of {source}"]
         weighed = t.rest_kg is not None
         head = ["motor on sale", "kv", "g", *(["kg"] if weighed else []), "P(met)", "power W", "peak A", "of A",
                 "full N"]  # fmt: skip

@@ -118,13 +118,13 @@ class KnownMotor:
     mass_g: float = math.nan  # [g]
     max_current_A: float = math.nan  # that the maker allows [A]
     maker: str = ""
+    max_power_W: float = math.nan  # that the maker allows [W]
 
 
 def _known(one: NamedMotor) -> KnownMotor:
-    mohm, idle, mass, most = (
-        math.nan if v is None else v for v in (one.resistance_mohm, one.no_load_A, one.mass_g, one.max_current_A)
-    )
-    return KnownMotor(one.name, one.kv, 1e-3 * mohm, idle, mass, most, one.maker)
+    told = (one.resistance_mohm, one.no_load_A, one.mass_g, one.max_current_A, one.max_power_W)
+    mohm, idle, mass, most, power = (math.nan if v is None else v for v in told)
+    return KnownMotor(one.name, one.kv, 1e-3 * mohm, idle, mass, most, one.maker, power)
 
 
 def motors_of(given: str | os.PathLike[str] | KnownMotor) -> tuple[KnownMotor, ...]:

@@ -179,6 +179,7 @@ def choose(
             target = other
             table = ranked(target)
     table["why"] = _reasons(table, target, sure)
+    table = table.drop(columns="beyond")
     return table, target, pd.DataFrame(_on_sale(table, loads, spreads, target, sure))
 
 
@@ -209,7 +210,7 @@ MAKERS = 3
 def _on_sale(
     table: pd.DataFrame, loads: Sequence[RotorLoads], spreads: Sequence[LoadScatter], target: Target, sure: float
 ) -> list[dict[str, Any]]:
-    """The most usual motors on sale for the first propeller that are sure of the target and stand their current."""
+    """The most usual motors on sale for the first propeller that are sure of the target and stand full throttle."""
     first = table.iloc[0]
     if not target.sized or first.probability < sure or target.use.fluid != "air":
         return []
@@ -220,9 +221,9 @@ def _on_sale(
     for motor in motors_file.on_sale(math.sqrt(even.kv * first.kv), first.motor_g, 0.8 * even.peak_A):
         if motor.maker in found:
             continue
-        row = _rows(one, u, (motor,), theirs)[0] | {"maker": motor.maker, "max_current_A": motor.max_current_A}
-        if row["probability"] >= sure and not row["peak_A"] > motor.max_current_A:
-            found[motor.maker] = row
+        row = _rows(one, u, (motor,), theirs)[0]
+        if row["probability"] >= sure and not row.pop("beyond"):
+            found[motor.maker] = row | {"maker": motor.maker, "max_current_A": motor.max_current_A}
         if len(found) == MAKERS:
             break
     return list(found.values())
@@ -449,11 +450,12 @@ def _rows(
             asked = asked if target.fixed else 2.0 * at
     chain = _chain(loads, machines, target, draws)
     own = _Chain(chain.k, chain.ohm[:, :1], chain.idle_A[:, :1], chain.battery_ohm[:, :1], chain.voc)
-    duty, bus, _ = own.at(loads.rpm[None, :], loads.torque_Nm[None, :])
+    duty, bus, watts = own.at(loads.rpm[None, :], loads.torque_Nm[None, :])
     reach = np.isfinite(duty)
     last = loads.rpm.size - 1 - np.argmax(reach[:, ::-1], axis=1)
     some, motor = reach.any(axis=1), np.arange(len(machines))
     most, peak = np.where(some, loads.thrust_N[last], 0.0), np.where(some, bus[motor, last], math.nan)
+    peak_W = np.where(some, watts[motor, last], math.nan)
     n_full, n_at = (loads.speed_for(T / thrust) for T in (asked, at))
     duty, _, _ = chain.at(n_full, torque * loads.torque_at(n_full))
     _, amps, power = chain.at(n_at, torque * loads.torque_at(n_at))
@@ -479,9 +481,17 @@ def _rows(
          "tip_mach": float(mach[i, 0]), "full_thrust_N": float(most[i]), "propulsion_g": 1e3 * own_kg,
          "motor_g": 1e3 * float(parts.motor),
          "mass_kg": math.nan if target.rest_kg is None else target.rotors * float(at[i]) / G0,
-         "at_N": float(at[i]), "asked_N": float(asked[i]), "keller_N": loads.keller_N}
+         "at_N": float(at[i]), "asked_N": float(asked[i]), "keller_N": loads.keller_N,
+         "beyond": _beyond(m, float(peak[i]), float(peak_W[i]))}
         for i, m in enumerate(machines)
     ]  # fmt: skip
+
+
+def _beyond(motor: KnownMotor, peak_A: float, peak_W: float) -> str:
+    """What a motor takes at full throttle beyond what its maker allows; "" where nothing is known to be."""
+    pairs = ((peak_A, motor.max_current_A, "A"), (peak_W, motor.max_power_W, "W"))
+    words = " and ".join(f"{v:.3g} {unit} of {most:.4g}" for v, most, unit in pairs if v > most)
+    return words and f"takes {words} at full throttle"
 
 
 def _parts(loads: RotorLoads, target: Target, rpm: float, thrust_N: float, motor_g: float) -> motors_file.Masses:
@@ -530,5 +540,5 @@ def _reasons(table: pd.DataFrame, target: Target, sure: float) -> list[str]:
         if not words and i:
             more, size = row.mean_W / best.mean_W - 1.0, row.diameter_in - best.diameter_in
             words.append(f"{more:+.1%} power" + (f", {size:+.3g} in" if more < 0.0 and size > 0.0 else ""))
-        out.append(", ".join(words))
+        out.append(", ".join([*words, *([row.beyond] if row.beyond else [])]))
     return out
