@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -136,3 +137,21 @@ def test_the_title_ends_its_lines_with_its_phrases(case: Case) -> None:
     n = np.linspace(5000.0, 9000.0, 4)
     view = against_band(case, [points(case, n, np.zeros(4), 0.0)])
     assert view._title().splitlines() == [case.name, "readings in the 95 % band: 4 of 4 thrust, 4 of 4 torque"]
+
+
+def test_static_and_flight_points_have_marks_of_their_own_and_a_key_in_full(case: Case) -> None:
+    """No name in the key is cut, however long, and the key lies inside the picture."""
+    n, J = np.full(9, 9000.0), np.r_[np.zeros(3), np.linspace(0.1, 0.6, 6)]
+    found = points(case, n, J * n / 60.0 * case.diameter_m, 0.1)
+    name = "a_recording_with_a_name_of_more_than_sixty_letters_in_one_word_2026.csv and 3 more"
+    figure = against_band(case, [replace(found, name=name)]).figure()
+    figure.canvas.draw()
+    (key,) = figure.legends
+    told = ["".join(text.get_text().split()) for text in key.get_texts()]
+    whole = "".join(name.split())
+    assert sum(text.startswith(whole) for text in told) == 2 and len(set(told)) == len(told)
+    box = key.get_window_extent()
+    assert box.x0 >= 0.0 and box.y0 >= 0.0 and box.x1 <= figure.bbox.x1
+    marks = {(bar.lines[0].get_marker(), bar.lines[0].get_color()): bar.lines[0].get_xdata()
+             for bar in figure.axes[0].containers}  # fmt: skip
+    assert sorted(len(x) for x in marks.values()) == [3, 6]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,6 +26,8 @@ from bemt.rotors.case import Case
 from bemt.rotors.case.propagate import propagate
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from bemt.judge.compare.matched import MatchedChannel
     from bemt.judge.compare.recordings import RunChange
 
@@ -39,7 +41,7 @@ _GRID = 41  # points of the drawn band
 _MOVES = 0.02  # change of J over a recording from which it is drawn over J
 _ONE_SPEED = 0.03  # share by which speeds differ that are drawn as one
 _AROUND = 0.1  # share of its speed by which the band reaches beyond a single point
-_WIDE, _NOTES_WIDE = 60, 80  # characters in a line above the picture, and below it
+_WIDE, _NOTES_WIDE, _KEY_WIDE = 60, 80, 28  # characters in a line above the picture, below it, and of a key
 _MARKS = (("o", canvas.BLACK), ("s", canvas.RED), ("^", canvas.GREEN), ("D", canvas.PURPLE))
 
 
@@ -100,7 +102,14 @@ class PredictionView:
         return self.picture("png")
 
     def picture(self, kind: str) -> bytes:
-        """Draw it, png, pdf or svg: one panel a channel, one above the other, legible at the width of a telephone."""
+        """Draw it, png, pdf or svg."""
+        import matplotlib
+
+        with matplotlib.rc_context(canvas.STYLE):
+            return canvas.drawn(self.figure(), kind, canvas.DPI)
+
+    def figure(self) -> Figure:
+        """One panel a channel, one above the other, legible at the width of a telephone."""
         import matplotlib
 
         with matplotlib.rc_context(canvas.STYLE):
@@ -114,7 +123,7 @@ class PredictionView:
             notes = "\n".join(line for note in self.notes[:2] for line in textwrap.wrap(note, _NOTES_WIDE))
             figure.legend(handles, labels, loc="outside lower center", ncols=2, title=notes, title_fontsize=7)
             figure.suptitle(self._title(), fontsize=9)
-            return canvas.drawn(figure, kind, canvas.DPI)
+            return figure
 
     def _title(self) -> str:
         """The case, and what of the readings lies in its band, a line each."""
@@ -123,18 +132,27 @@ class PredictionView:
         told = f"readings in the 95 % band: {counts}" if counts else "the model gives no result at these points"
         return "\n".join([*textwrap.wrap(self.case, _WIDE), told])
 
+    def _marked(self) -> Iterator[tuple[Dataset, Array, str]]:
+        """Points that share a mark, and their name: of a recording with both, those at rest and those in the stream."""
+        for part in self.recorded:
+            still = part["J"] == 0.0
+            both = bool(still.any() and not still.all())
+            for rows, where in ((still, ", static"), (~still, ", V > 0")):
+                if rows.any():
+                    yield part, rows, part.name + (where if both else "")
+
     def _panel(self, axis: Any, channel: str) -> None:
         x, y, half = self.curve[self.over], self.curve[channel], self.curve.u[channel]
         axis.fill_between(x, y - half, y + half, color=canvas.SKY, alpha=0.35, linewidth=0, label="BEMT, 95 % band")
         axis.plot(x, y, color=canvas.BLUE, label="BEMT")
-        for k, part in enumerate(self.recorded):
+        for k, (part, rows, name) in enumerate(self._marked()):
             if channel not in part:
                 continue
             mark, colour = _MARKS[k % len(_MARKS)]
-            u = np.nan_to_num(part.u[channel])
-            axis.errorbar(part[self.over], part[channel], u if np.any(u > 0.0) else None, fmt=mark, color=colour,
-                          markersize=4, elinewidth=0.8, markerfacecolor="none" if k else colour, zorder=3,
-                          label=part.name[:28])  # fmt: skip
+            u = np.nan_to_num(part.u[channel][rows])
+            axis.errorbar(part[self.over][rows], part[channel][rows], u if np.any(u > 0.0) else None, fmt=mark,
+                          color=colour, markersize=4, elinewidth=0.8, markerfacecolor="none" if k else colour,
+                          zorder=3, label="\n".join(textwrap.wrap(name, _KEY_WIDE)))  # fmt: skip
         axis.set_ylabel(LABEL[channel])
         axis.margins(x=0.04)
         if self.over == "rpm":

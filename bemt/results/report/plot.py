@@ -466,7 +466,7 @@ def figure(plot: Plot) -> Figure | None:
         look = t.trace
         paths, beyond = (_points if look.points else _curves)(t, f)
         key = _marker(look.shape, 12, 9) if look.points else ("line", "M1 9H23")
-        drawn.append(DrawnTrace(look.name[:60], look.colour, look.dash, paths, beyond, key))
+        drawn.append(DrawnTrace(look.name, look.colour, look.dash, paths, beyond, key))
     at = " ".join(f"{i},{f.inside(f.x(x)):.0f},{f.y(y):.0f}" for i, t in enumerate(traces) for x, y, _ in t.points)
     return Figure(plot.title, plot.note, plot.wide, width, height, [*lines, *more], [*words, *notes], drawn, at,
                   _csv(plot, traces))  # fmt: skip
