@@ -1247,6 +1247,9 @@ def test_a_flight_log_is_read_whole_or_refused(tmp_path: Path, version: int) -> 
     assert got["time_s"][-1] == pytest.approx(0.019)
     assert got["acceleration_z_m_s2"][0] == pytest.approx(G0)
     assert got["voltage_V"][0] == pytest.approx(3.7)
+    packed = tmp_path / "flight.usdlog.gz"
+    packed.write_bytes(gzip.compress(flight(version=version)))
+    assert len(import_file(packed)) == 20
     damaged = bytearray(path.read_bytes())
     damaged[-20] ^= 0xFF
     path.write_bytes(bytes(damaged))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 from pathlib import Path
 
 import numpy as np
@@ -226,6 +227,13 @@ def test_the_extension_decides_nothing(tmp_path: Path) -> None:
     (prop,) = sound(tmp_path)
     assert prop.static is not None
     assert isinstance(importers.read(tmp_path / "apce_9x6_static_1ab.dat"), uiuc.UiucStatic)
+
+
+def test_a_packed_table_is_read_as_the_plain_one(tmp_path: Path) -> None:
+    (tmp_path / "apce_9x6_static_1ab.txt.gz").write_bytes(gzip.compress(STATIC.encode()))
+    (tmp_path / "apce_9x6_static_1ab.txt").write_text(STATIC)
+    packed, plain = (importers.read(tmp_path / f"apce_9x6_static_1ab.{end}") for end in ("txt.gz", "txt"))
+    assert np.array_equal(packed.CT, plain.CT) and packed.rows == plain.rows
 
 
 def test_registry_finds_importers_and_asks_when_two_match(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.packed import unpacked
 from bemt.base.toml_text import Collector
 from bemt.base.units import G0
 from bemt.data.readers import Reader, load_bytes
@@ -48,7 +49,8 @@ def sniff_crazyflie_log(head: bytes | str) -> bool:
 
 def read_crazyflie_log(path: str | os.PathLike[str]) -> Dataset:
     """Read a log."""
-    data, log = load_bytes(path), Collector(os.fspath(path))
+    raw, log = load_bytes(path), Collector(os.fspath(path))
+    data = unpacked(raw, log.file)
     if not sniff_crazyflie_log(data):
         log.refuse("", "other first bytes", "a Crazyflie log, which begins with 0xBC")
     if zlib.crc32(data[:-4]) != struct.unpack("<I", data[-4:])[0]:
@@ -60,7 +62,7 @@ def read_crazyflie_log(path: str | os.PathLike[str]) -> Dataset:
     tables = {k: v for k, v in tables.items() if v["time_s"].size > 1}
     if not tables:
         log.refuse("", "no records", "two or more")
-    return _made(log.file, hashlib.sha256(data).hexdigest(), tables)
+    return _made(log.file, hashlib.sha256(raw).hexdigest(), tables)
 
 
 def _text(data: bytes | memoryview, at: int) -> tuple[str, int]:

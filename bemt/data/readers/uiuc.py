@@ -41,7 +41,7 @@ from typing import Any
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError, system_fault
+from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of
 from bemt.data.readers import HEAD_BYTES, SourceText, head_text, load_text, number
 from bemt.data.readers.uiuc_names import VARIABLE_PITCH, UiucFile, UiucName, parse_file_name
@@ -413,12 +413,8 @@ def scan_folder(path: str | os.PathLike[str]) -> UiucFolder:
 
 def read(path: str | os.PathLike[str]) -> Any:
     """Read one table of the archive, by its header."""
-    target = Path(path)
-    try:
-        role = role_of(_head(target))
-    except OSError as error:
-        raise InputError(system_fault(error, os.fspath(path), "a readable file")) from error
-    if role is None:
+    source = load_text(path)
+    if (role := role_of(source.text)) is None:
         expected = "one of the headers r/R c/R beta, RPM CT CP, J CT CP eta, r/R t/c"
-        raise InputError(Fault(os.fspath(path), "1", "no header of this archive", expected))
-    return _READERS[role](target)
+        source.refuse("1", "no header of this archive", expected)
+    return _READERS[role](Path(path))
