@@ -53,6 +53,7 @@ class Answered:
     """
 
     text: Any  # text for a terminal, with options
+    document: Any  # plain values, for answers that have them at hand
 
     def __str__(self) -> str:
         """Text with parameters in place of options."""
@@ -72,7 +73,8 @@ class Answered:
 
     def _document(self) -> Mapping[str, Any]:
         """What `to_dict` makes plain."""
-        raise NotImplementedError
+        found: Mapping[str, Any] = self.document
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,9 +87,6 @@ class Told(Answered):
     exit_code: int = EXIT_OK
     complaints: tuple[str, ...] = ()  # lines of the error stream
     files: tuple[Path, ...] = ()  # what was written
-
-    def _document(self) -> dict[str, Any]:
-        return self.document
 
 
 def action(

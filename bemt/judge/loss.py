@@ -11,6 +11,7 @@ import math
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
+from bemt.base.action import Answered
 from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation
 from bemt.physics import effects
 
@@ -59,6 +60,31 @@ class Decision:
     # Whose evidence it is: of the "model", of the "drive", of "both", or what the "files" say themselves
     by: str = "model"
 
+    def reasoned_as(self, other: Decision) -> Decision:
+        """The same, with the reason of another decision where both say the same."""
+        same = (self.verdict, self.effects) == (other.verdict, other.effects)
+        return replace(self, why=other.why) if same else self
+
+
+class Judged(Answered):
+    """Answer with a verdict."""
+
+    @property
+    def verdict(self) -> str:
+        """One of none, named, class, sensor, unknown, insufficient."""
+        return str(self.document["verdict"])
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Effects of the verdict; for a class, all members."""
+        return tuple(self.document["effects"])
+
+    @property
+    def probability(self) -> float | None:
+        """How sure the verdict is, as the first line says it; None where nothing was weighed. [1]"""
+        found: float | None = self.document.get("probability")
+        return found
+
 
 def expected(
     said: frozenset[str], named: bool, P: Mapping[Explanation, float], c: Costs = COSTS,
@@ -76,9 +102,7 @@ def expected(
     return total
 
 
-def decide(
-    P: Mapping[Explanation, float], costs: Costs = COSTS, still: frozenset[str] = frozenset()
-) -> Decision:  # fmt: skip
+def decide(P: Mapping[Explanation, float], costs: Costs = COSTS, still: frozenset[str] = frozenset()) -> Decision:
     """Answer of least expected loss; `still` are effects that move the readings where nothing is wrong.
 
     These are no cause: they stand in a class beside one at most.
@@ -153,9 +177,7 @@ def _of_class(decision: Decision, inside: Mapping[Explanation, float]) -> Decisi
     return replace(decision, probability=total, why=why, sets=sets, beside=beside)
 
 
-def _sets(
-    said: tuple[str, ...], inside: Mapping[Explanation, float]
-) -> tuple[str, tuple[tuple[str, ...], ...]]:  # fmt: skip
+def _sets(said: tuple[str, ...], inside: Mapping[Explanation, float]) -> tuple[str, tuple[tuple[str, ...], ...]]:
     """Effect of the largest probability, and one set of effects per cause: that one if it is in nearly all of it."""
     share = {i: sum(p for k, p in inside.items() if i in k) for i in said}
     first = max(said, key=lambda i: share[i])

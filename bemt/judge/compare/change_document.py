@@ -15,18 +15,10 @@ from bemt import __version__
 from bemt.base.document import Documented
 from bemt.base.tables import number_text, or_null, text_table
 from bemt.base.unit_errors import speed_ratios
+from bemt.judge.compare import recordings
 from bemt.judge.compare.drive_laws import FAMILY, FAMILY_WORD, Judgement, check_of, title_of
-from bemt.judge.compare.matched import LOADS, WITHOUT_SPEED
-from bemt.judge.compare.recordings import (
-    AS_RECORDED,
-    ERROR_IN,
-    IN_WIND,
-    NO_SPEED,
-    NOTHING_SHARED,
-    OTHER_STAND,
-    REVERSED,
-    RunChange,
-)
+from bemt.judge.compare.matched import LOADS, OVER_COMMAND, WITHOUT_SPEED
+from bemt.judge.compare.recordings import IN_WIND, NO_SPEED, NOTHING_SHARED, OTHER_STAND, REVERSED, RunChange
 from bemt.judge.compare.selection import Invocation
 from bemt.judge.compare.smooth_change import Ratio
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation, Size
@@ -45,7 +37,7 @@ _FIRST = 5.0
 # Change of a load that days of one site can make, and from which on it is worth a thermometer, in ln.
 _DAY, _SEEN = 0.12, 0.03
 # Start of a verdict that rests on what both recordings state.
-_TOLD = (*AS_RECORDED, "voltage as recorded")
+_TOLD = (*recordings.AS_RECORDED, "voltage as recorded")
 # Scatter of readings at one speed, share, that no stand has: something else changes from reading to reading.
 _RESTLESS = 0.10
 _REPEAT = "repeat the run of A and compare it with A: so much two runs differ by without a cause"
@@ -251,7 +243,7 @@ def _range(r: Ratio) -> str:
     low, high = r.range
     if r.kind == "at_power":
         return f"{math.exp(low):.0f} to {math.exp(high):.0f} W"
-    if r.over_command:
+    if r.kind in OVER_COMMAND:
         return f"{1e6 * low:.0f} to {1e6 * high:.0f} µs" if high < _PULSE else f"{low:.0%} to {high:.0%}"
     if high - low < 1e-9:
         return "advance ratio {:.2f} to {:.2f}".format(*r.advance_range)
@@ -262,14 +254,15 @@ def text(doc: ComparedRuns, details: bool = False) -> str:
     """Lines of a comparison."""
     lines = textwrap.wrap(headline(doc), 110)
     lines += [f"verdict: {doc.verdict}" + (f" {', '.join(doc.effects)}" if doc.effects else "")]
-    errors = [n for n in doc.notes if n.startswith(ERROR_IN)]
+    errors = [n for n in doc.notes if n.startswith(recordings.ERROR_IN)]
     lines += [textwrap.fill(n, 110, initial_indent="  ", subsequent_indent="    ") for n in errors]
     lines += _said(doc)
     rows = []
     for channel, r in doc.ratios.items():
         raw = r.ratio * r.density_ratio
         slope = "-"
-        if r.slope is not None and r.slope_error is not None and r.over_speed and r.slope_error < _NO_SLOPE:
+        over_speed = r.kind not in (*OVER_COMMAND, *WITHOUT_SPEED)
+        if over_speed and r.slope is not None and r.slope_error is not None and r.slope_error < _NO_SLOPE:
             slope = f"{r.slope:+.1%} +- {r.slope_error:.1%}"
         more = [slope, f"{r.scatter:.1%}", "{}, {}".format(*r.points)]
         rows.append([_at(WORD.get(channel, channel), r), f"{raw:.4f}", *_ends(r, r.density_ratio), *more])
@@ -299,7 +292,7 @@ def headline(doc: ComparedRuns) -> str:
         return _open(doc, f" ({moved})" if moved else "")
     if doc.rule == REVERSED:
         return f"{REVERSED[0].upper()}{REVERSED[1:]} ({moved}): the cell is reversed, or the rotor turns the other way."
-    if effects == ["air_density"] and doc.rule.startswith(AS_RECORDED):
+    if effects == ["air_density"] and doc.rule.startswith(recordings.AS_RECORDED):
         return f"Nothing but the air changed, as recorded ({moved}); the coefficients agree."
     if len(effects) == 1:
         lead = "The stand, not the rotor" if verdict == "sensor" else "What changed"
@@ -393,7 +386,7 @@ def _of_drive(doc: ComparedRuns) -> list[str]:
     if drive and drive.effects and drive.effects != doc.effects:
         return [f"Drive: {drive.verdict}: {', '.join(title_of(k) for k in drive.effects)}."]
     if drive and doc.verdict != "none" and drive.verdict == "none":
-        moved = any(r.over_command and not r.low95 < 1.0 < r.high95 for r in doc.ratios.values())
+        moved = any(r.kind in OVER_COMMAND and not r.low95 < 1.0 < r.high95 for r in doc.ratios.values())
         return [f"Drive: no change beyond {'what load, voltage or a miscount explains' if moved else 'scatter'}."]
     return []
 

@@ -68,9 +68,7 @@ class Judgement(Decision):
     parameters: Sizes = field(default_factory=dict)  # Of effects, as far as they were worked out
 
     @classmethod
-    def of(
-        cls, said: Decision, P: Mapping[Explanation, float], parameters: Sizes | None = None
-    ) -> Judgement:  # fmt: skip
+    def of(cls, said: Decision, P: Mapping[Explanation, float], parameters: Sizes | None = None) -> Judgement:
         """The same decision with its posterior."""
         ranked = dict(sorted(P.items(), key=lambda kv: -kv[1]))
         return cls(**{f.name: getattr(said, f.name) for f in fields(Decision)}, ranked=ranked,

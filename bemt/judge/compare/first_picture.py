@@ -20,16 +20,14 @@ from bemt.base import canvas
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.judge.compare.change_document import WORD, ComparedRuns, headline
-from bemt.judge.compare.matched import OVER_COMMAND, POWER_OF_SPEED, WITHOUT_SPEED
+from bemt.judge.compare.matched import OVER_COMMAND, POWER_OF_SPEED, WITHOUT_SPEED, MatchedChannel
+from bemt.judge.compare.recordings import RunChange
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case import Case
 from bemt.rotors.case.propagate import propagate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from bemt.judge.compare.matched import MatchedChannel
-    from bemt.judge.compare.recordings import RunChange
 
 LABEL = {
     "thrust_N": "thrust [N]", "torque_Nm": "torque [N m]", "CT": "$C_T$ = T/($\\rho n^2 D^4$) [1]",
@@ -183,25 +181,23 @@ def against_band(case: Case, recordings: Sequence[Dataset]) -> PredictionView:
     def shown(name: str, at: tuple[Array, ...], values: dict[str, Array], u: dict[str, Array]) -> Dataset:
         n = at[0] / 60.0
         unit = {"thrust_N": at[2] * n**2 * D**4, "torque_Nm": at[2] * n**2 * D**5 / (2.0 * np.pi)}
-        name_of = {c: _COEFFICIENT[c] if over == "J" else c for c in values}
-        scale = {c: unit[c] if over == "J" else np.ones_like(n) for c in values}
-        drawn = {name_of[c]: v / scale[c] for c, v in values.items()}
-        band = {name_of[c]: v / scale[c] for c, v in u.items()}
-        return Dataset("points", name, {"rpm": at[0], "J": at[1] / (n * D), **drawn}, band)
+        if over == "J":
+            values, u = ({_COEFFICIENT[c]: v / unit[c] for c, v in some.items()} for some in (values, u))
+        return Dataset("points", name, {"rpm": at[0], "J": at[1] / (n * D), **values}, u)
 
-    def predicted(name: str, rows: slice, at: tuple[Array, ...]) -> Dataset:
-        return shown(name, at, {c: solved.points[c][rows] for c in loads}, {c: half[c][rows] for c in loads})
+    def predicted(rows: slice, at: tuple[Array, ...]) -> Dataset:
+        return shown(case.name, at, {c: solved.points[c][rows] for c in loads}, {c: half[c][rows] for c in loads})
 
     recorded, model, start = [], [], count
     for d in parts:
         at = (d.rpm, d.airspeed_m_s, d.density_kg_m3)
         own = [c for c in loads if c in d]
         recorded.append(shown(d.name, at, {c: d[c] for c in own}, {c: d.u[c] for c in own}))
-        model.append(predicted(case.name, slice(start, start + len(d)), at))
+        model.append(predicted(slice(start, start + len(d)), at))
         start += len(d)
     channels = tuple(_COEFFICIENT[c] if over == "J" else c for c in loads)
-    curve = predicted(case.name, slice(count), line)
-    return PredictionView(case.name, over, channels, tuple(recorded), tuple(model), curve, tuple(notes))
+    return PredictionView(case.name, over, channels, tuple(recorded), tuple(model), predicted(slice(count), line),
+                          tuple(notes))  # fmt: skip
 
 
 def _usable(d: Dataset) -> Dataset:

@@ -314,7 +314,6 @@ class _Readings:
 
 
 def _readings(run: StandRun, name: str, channel: str, diameter: float) -> _Readings | None:
-    """Points of one channel in one recording."""
     v = run.points.values.get(channel)
     if v is None or np.isfinite(v).sum() < 2:
         return None

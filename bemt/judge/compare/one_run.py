@@ -7,10 +7,9 @@ from __future__ import annotations
 
 import math
 import os
-import re
 import shlex
 import textwrap
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -39,7 +38,7 @@ STAND_U = dict(zip(("thrust_N", "torque_Nm"), STAND.tolist(), strict=True))
 """Standard uncertainty of a load that a stand does not state, over its size [1]."""
 _ROWS = 6  # points on one screen
 _NEAR_ZERO = 0.1  # share of the largest value of a load below which a difference has no per cent
-_NO_DENSITY = re.compile(r"density: not stated")
+_NO_DENSITY = "density: not stated"
 _NAMES = {"program": "", "cells": "cells", "grid_level": "grid", "turbulence": "", "solver": "", "domain": "domain"}
 
 
@@ -226,7 +225,6 @@ def _angle(points: Dataset, rows: NDArray[np.intp], case: Case, name: str) -> ND
 
 
 def _point(cfd: Dataset, bemt: Dataset, i: int, k: int) -> PointOfRun:
-    """Loads at one point."""
     loads = {
         name: _load(float(cfd[name][i]), float(cfd.u[name][i]), bemt, name, k)
         for name in ("thrust_N", "torque_Nm")
@@ -345,9 +343,10 @@ def text(found: RunComparison, details: bool = False) -> str:
         f"{Path(found.run).name} ({_set_up(found.conditions) or bare}) and case {found.case}",
         text_table(header, [row for p in shown for row in _rows(p)], (2, 7), "  "),
     ]  # fmt: skip
+    whose = ", of the case: the recording states none" if any(n.startswith(_NO_DENSITY) for n in found.notes) else ""
     if left := len(found.points) - len(shown):
         lines.append(f"  ... {left} more points (--details)")
-    lines.append(_filled(f"density {_span(p.density_kg_m3 for p in found.points)} kg/m3{_whose(found.notes)}", "  "))
+    lines.append(_filled(f"density {_span(p.density_kg_m3 for p in found.points)} kg/m3{whose}", "  "))
     lines.append(f"  ±: one standard uncertainty; BEMT's in line 1: {parts}; in u: over both bands")
     for over in dict.fromkeys(found.averaged.values()):
         lines.append(f"  averaged: {', '.join(k for k, v in found.averaged.items() if v == over)}: {over}")
@@ -392,11 +391,6 @@ def _span(values: Iterable[float]) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def _whose(notes: Collection[str]) -> str:
-    """That the density is the case's, where the recording states none."""
-    return ", of the case: the recording states none" if any(map(_NO_DENSITY.match, notes)) else ""
-
-
 def _set_up(told: Mapping[str, str]) -> str:
     """How a run was computed, as far as it says."""
     words = [f"{told[k]}{' ' + word if word else ''}" for k, word in _NAMES.items() if k in told]
@@ -405,7 +399,6 @@ def _set_up(told: Mapping[str, str]) -> str:
 
 
 def _audited(line: AuditLine) -> str:
-    """What one check of a run has found."""
     unsaid = line.finding.endswith("not stated") and line.consequence == "unknown"
     words = "not stated" if unsaid else ": ".join(filter(None, (line.finding, line.consequence)))
     lead = f"  {line.status:11s}"

@@ -16,29 +16,10 @@ from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.tables import number_of, some
 from bemt.base.units import ZERO_CELSIUS
 from bemt.data.recordings import cfd_setup
+from bemt.judge.compare import drive_laws, matched
 from bemt.judge.compare import smooth_change as fits
-from bemt.judge.compare.drive_laws import (
-    SUPPLY,
-    TOLD_VOLTAGE,
-    Judgement,
-    Load,
-    judge_drive,
-    log_density_of_ratios,
-    weigh,
-    weigh_factor,
-)
-from bemt.judge.compare.matched import (
-    DRIVE,
-    LOADS,
-    OVER_COMMAND,
-    POWER_OF_SPEED,
-    SESSION,
-    WITHOUT_SPEED,
-    MatchedChannel,
-    StandRun,
-    advance,
-    density_change,
-)
+from bemt.judge.compare.drive_laws import Judgement, Load
+from bemt.judge.compare.matched import LOADS, MatchedChannel, StandRun, advance, density_change
 from bemt.judge.explanation import NONE, Size
 from bemt.judge.loss import SECOND, Decision, decide, joined, parts
 
@@ -92,7 +73,7 @@ class RunChange:
         if not self.without_speed:
             return self.judge(self) if self.loads_by_name else NO_VERDICT
         # a cut blade takes less power, and gives as much thrust for it: at one command both are less
-        P = min((weigh_factor(c, scatter) for c, scatter in self._bare), key=lambda P: P[NONE])
+        P = min((drive_laws.weigh_factor(c, scatter) for c, scatter in self._bare), key=lambda P: P[NONE])
         said = decide(P)
         return Judgement.of(replace(said, why=self.no_speed) if said.by == "files" else said, P)
 
@@ -101,7 +82,7 @@ class RunChange:
         """Thrust at what stands for the speed, with its scatter: at equal power, at equal command and known voltage."""
         runs, volts = [self.rotor], [r.points.values.get("voltage_V") for r in (self.a, self.b)]
         V = [float(np.nanmean(v)) for v in volts if v is not None]
-        if "at_power" in self.rotor.channels and len(V) == 2 and abs(V[1] / V[0] - 1.0) < SESSION["voltage"]:
+        if "at_power" in self.rotor.channels and len(V) == 2 and abs(V[1] / V[0] - 1.0) < matched.SESSION["voltage"]:
             runs.append(fits.prepared(self.a, self.b, ("at_command",), self.diameter_m))
         return [(c, run.likelier[name]) for run in runs for name, c in run.channels.items()]
 
@@ -109,7 +90,7 @@ class RunChange:
     def no_speed(self) -> str:
         """Why thrust that changed has no cause without a speed, with its change at each."""
         found = [fits.ratio_of(c, scatter) for c, scatter in self._bare]
-        told = {f"{r.ratio - 1.0:+.1%} at equal {WITHOUT_SPEED[r.kind]}": None for r in found}
+        told = {f"{r.ratio - 1.0:+.1%} at equal {matched.WITHOUT_SPEED[r.kind]}": None for r in found}
         return f"thrust {', '.join(told)}; {NO_SPEED}"
 
     @cached_property
@@ -119,13 +100,13 @@ class RunChange:
             return NO_VERDICT
         if _unloaded(self.a, self.b, self.diameter_m):
             return replace(NO_VERDICT, why="the advance ratios differ, and the drive follows the load")
-        P = weigh(self.behind.channels, (self.behind.free, self.behind.steady), self._load(self._miscount))
+        P = drive_laws.weigh(self.behind.channels, (self.behind.free, self.behind.steady), self._load(self._miscount))
         if not self._by_volts:
-            return judge_drive(P)
+            return drive_laws.judge_drive(P)
         # known from the files: what is left is whether something else changed as well
         ratio = math.exp(self._by_volts)
-        said = judge_drive({k | SUPPLY: p * (1.0 if k == NONE else SECOND) for k, p in P.items()})
-        if said.effects != tuple(SUPPLY):
+        said = drive_laws.judge_drive({k | drive_laws.SUPPLY: p * (1.0 if k == NONE else SECOND) for k, p in P.items()})
+        if said.effects != tuple(drive_laws.SUPPLY):
             return said
         why = f"voltage as recorded, {ratio - 1.0:+.1%} at equal command; the speed goes with it"
         return replace(said, parameters={"battery_sag": {"ratio": Size(ratio, ratio, ratio, "1")}}, why=why)
@@ -134,7 +115,7 @@ class RunChange:
     def _by_volts(self) -> float:
         """Voltage of B over that of A at equal command where both tell and they differ, natural logarithm, else 0."""
         change = next((math.log(r.ratio) for r in self.ratios.values() if r.kind == "voltage"), 0.0)
-        return change if "speed" in self.behind.channels and abs(change) >= TOLD_VOLTAGE else 0.0
+        return change if "speed" in self.behind.channels and abs(change) >= drive_laws.TOLD_VOLTAGE else 0.0
 
     @property
     def _miscount(self) -> float:
@@ -153,10 +134,11 @@ class RunChange:
             return 0.0
         if misread and _unloaded(self.a, self.b, self.diameter_m):
             return 0.0
-        volts, right = at["voltage"][0] if "voltage" in at else None, self._load(0.0)
+        volts = at["voltage"][0] if "voltage" in at else None
         read = self._load(miscount)
-        read = replace(read, change=read.change - misread)
-        return log_density_of_ratios(drive, volts, read) - log_density_of_ratios(drive, volts, right)
+        loads = replace(read, change=read.change - misread), self._load(0.0)
+        as_read, right = (drive_laws.log_density_of_ratios(drive, volts, load) for load in loads)
+        return as_read - right
 
     def _load(self, miscount: float) -> Load:
         """How the load of the drive changed; where torque is not recorded, thrust tells it by half."""
@@ -167,7 +149,7 @@ class RunChange:
         unsure, along = math.log(r.high68 / r.low68) / 2.0, np.log([point[2] for point in r.curve])
         varies = float(np.max(np.abs(along - math.log(r.ratio))))
         channel = next(c for c, one in self.ratios.items() if one is r)
-        change = math.log(r.ratio) + POWER_OF_SPEED.get(channel, 2.0) * miscount
+        change = math.log(r.ratio) + matched.POWER_OF_SPEED.get(channel, 2.0) * miscount
         unsure = unsure if "torque" in found else math.hypot(unsure, _BY_THRUST * change)
         return Load(change, miscount, unsure, varies)
 
@@ -180,7 +162,7 @@ class RunChange:
     @property
     def without_speed(self) -> str:
         """What thrust is compared at, in words, where no speed is recorded; else ""."""
-        return next((words for name, words in WITHOUT_SPEED.items() if name in self.channels), "")
+        return next((words for name, words in matched.WITHOUT_SPEED.items() if name in self.channels), "")
 
     @property
     def loads_by_name(self) -> dict[str, MatchedChannel]:
@@ -192,14 +174,10 @@ class RunChange:
         """Verdict on both: loads at the measured speed, the drive at one command."""
         if not self.drive.ranked or not self.loads.ranked:
             return self.loads if self.loads.ranked or not self.drive.effects else self.drive
-        each = (self.loads, self.drive)
-        ranked = parts(self.loads.ranked, self.drive.ranked)
-        decisions = [self.with_density(decide(ranked[0])), decide(ranked[1])]
-        for k, one in enumerate(each):
-            if (decisions[k].verdict, decisions[k].effects) == (one.verdict, one.effects):
-                decisions[k] = replace(decisions[k], why=one.why)
-        said = joined(decisions[0], decisions[1], ranked[0].get(NONE, 0.0))
-        P = {"model": ranked[0], "drive": ranked[1]}.get(said.by, ranked[0] | ranked[1])
+        P, Q = parts(self.loads.ranked, self.drive.ranked)
+        loads, drive = self.with_density(decide(P)).reasoned_as(self.loads), decide(Q).reasoned_as(self.drive)
+        said = joined(loads, drive, P.get(NONE, 0.0))
+        P = {"model": P, "drive": Q}.get(said.by, P | Q)
         return Judgement.of(said, P, {**self.loads.parameters, **self.drive.parameters})
 
     def with_density(self, said: Decision) -> Decision:
@@ -265,16 +243,14 @@ class RunChange:
         return any(c.turned for c in self.channels.values() if c.name == "thrust")
 
 
-def changed(
-    a: StandRun, b: StandRun, diameter_m: float, judge: Callable[[RunChange], Judgement]
-) -> RunChange:  # fmt: skip
+def changed(a: StandRun, b: StandRun, diameter_m: float, judge: Callable[[RunChange], Judgement]) -> RunChange:
     """Compare two recordings; ``judge`` says what acts on the rotor."""
     told = [d for d in (diameter_m, a.diameter_m, b.diameter_m) if math.isfinite(d)]
     diameter = told[0] if told else math.nan
     rotor = fits.prepared(a, b, tuple(LOADS), diameter)
     used = {c.channel for c in rotor.channels.values()}
-    behind = fits.prepared(a, b, [k for k, names in DRIVE.items() if not used & set(names)], diameter)
-    for name in WITHOUT_SPEED:
+    behind = fits.prepared(a, b, [k for k, names in matched.DRIVE.items() if not used & set(names)], diameter)
+    for name in matched.WITHOUT_SPEED:
         if not rotor.channels and not behind.channels:
             rotor = fits.prepared(a, b, (name,), diameter)
     channels = {**rotor.channels, **behind.channels}
@@ -387,8 +363,8 @@ def _notes(
 
 def _told_of(c: MatchedChannel) -> Iterator[str]:
     """Readings of a channel, each with where it was taken."""
-    at = c.x[:, 0] if c.name in OVER_COMMAND else np.exp(c.x[:, 0])
-    power = 0.0 if c.name in OVER_COMMAND else POWER_OF_SPEED.get(c.channel, 0.0)
+    at = c.x[:, 0] if c.name in matched.OVER_COMMAND else np.exp(c.x[:, 0])
+    power = 0.0 if c.name in matched.OVER_COMMAND else matched.POWER_OF_SPEED.get(c.channel, 0.0)
     size = np.exp(c.y + c.log_density * c.second) * at**power
     for v, x, J, second in zip(size, at, c.x[:, 1], c.second, strict=True):
         yield f"{v:.4g} at {x:.4g}{f' and advance {J:.2f}' if J else ''} in {'B' if second else 'A'}"

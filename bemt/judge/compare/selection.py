@@ -231,18 +231,17 @@ def speed_in_doubt(imported: Dataset, path: str) -> None:
         hint = f"{WHICH[0].upper()}{WHICH[1:]}"
         got, expected = "rows that differ in nothing else that was read", "the meaning of what they differ in"
         raise InputError(Fault(path, imported.unread, got, expected, hint))
-    told = named(imported).values
-    if (doubt := asks(imported).get("airspeed")) and "J" not in told:
-        name, got, fix = doubt
-        hint = f"{fix[0].upper()}{fix[1:]}; in still air: --airspeed-m-s 0 (compare: --air-a 0m/s, --air-b 0m/s)"
-        raise InputError(Fault(path, f"column {imported.headings.get(name, name)}", got, "the airspeed", hint))
+    told, doubts, headings = named(imported).values, asks(imported), imported.headings
+    for what, instead, expected, more in (
+        ("airspeed", "J", "the airspeed", "in still air: --airspeed-m-s 0 (compare: --air-a 0m/s, --air-b 0m/s)"),
+        ("rpm", "rpm", "the speed of rotation", "one speed for all rows: --rpm N"),
+    ):
+        if what in doubts and instead not in told:
+            name, got, fix = doubts[what]
+            hint = f"{fix[0].upper()}{fix[1:]}; {more}"
+            raise InputError(Fault(path, f"column {headings.get(name, name)}", got, expected, hint))
     if "rpm" in told:
         return
-    if doubt := asks(imported).get("rpm"):
-        name, got, fix = doubt
-        hint = f"{fix[0].upper()}{fix[1:]}; one speed for all rows: --rpm N"
-        raise InputError(Fault(path, f"column {imported.headings.get(name, name)}", got, "the speed of rotation", hint))
-    headings = imported.headings
     heading = {name: headings.get(name) or name for name in (*imported.values, *imported.texts)}
     faults = []
     for name, v in imported.values.items():

@@ -12,7 +12,7 @@ of every run), and scatter e of a share and a part of full scale, which is as la
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,17 +22,7 @@ from bemt.base.arrays import Array
 from bemt.base.document import Documented
 from bemt.base.gaussian.kernels import alike, smooth
 from bemt.base.gaussian.whitening import leave_one_out, log_density, whitener
-from bemt.judge.compare.matched import (
-    LOADS,
-    MARGIN,
-    OVER_COMMAND,
-    WITHOUT_SPEED,
-    MatchedChannel,
-    StandRun,
-    in_common,
-    matched,
-    taken,
-)
+from bemt.judge.compare.matched import LOADS, MARGIN, OVER_COMMAND, MatchedChannel, StandRun, in_common, matched, taken
 
 BEND = 0.7
 """Slow bend of what a run differs by from others, over its level [1]."""
@@ -194,16 +184,6 @@ class Ratio(Documented):
     advance_slope: float | None = None
     advance_slope_error: float | None = None
 
-    @property
-    def over_command(self) -> bool:
-        """Whether it is one at equal command."""
-        return self.kind in OVER_COMMAND
-
-    @property
-    def over_speed(self) -> bool:
-        """Whether it is one at equal speed."""
-        return not self.over_command and self.kind not in WITHOUT_SPEED
-
 
 def ratio_of(c: MatchedChannel, s: Scatter) -> Ratio:
     """Ratio of B to A at equal speed."""
@@ -266,27 +246,23 @@ def _slopes(c: MatchedChannel, at: NDArray[np.intp], d: Array, cov: Array) -> di
 class MatchedRuns:
     """Channels of one kind that both recordings have."""
 
-    channels: Mapping[str, MatchedChannel]  # By name
+    channels: dict[str, MatchedChannel]  # By name
     # Likeliest scatter if anything smooth, or one factor, changed between the recordings
-    free: Mapping[str, Scatter]
-    steady: Mapping[str, Scatter]
-    likelier: Mapping[str, Scatter]  # The better of the two
-    strays: Mapping[str, MatchedChannel]  # Readings that were left out
+    free: dict[str, Scatter]
+    steady: dict[str, Scatter]
+    likelier: dict[str, Scatter]  # The better of the two
+    strays: dict[str, MatchedChannel]  # Readings that were left out
 
 
 def prepared(a: StandRun, b: StandRun, names: Sequence[str], diameter: float) -> MatchedRuns:
     """Match channels, and find their scatter."""
-    channels: dict[str, MatchedChannel] = {}
-    free: dict[str, Scatter] = {}
-    steady: dict[str, Scatter] = {}
-    likelier: dict[str, Scatter] = {}
-    strays: dict[str, MatchedChannel] = {}
+    out = MatchedRuns({}, {}, {}, {}, {})
     for name in names:
         found = matched(a, b, name, diameter)
         if found is not None:
-            channels[name], stray, (free[name], loose) = without_strays(in_common(found))
-            steady[name], stiff = scatter_of(channels[name], steady_change(channels[name]))
-            likelier[name] = free[name] if loose > stiff else steady[name]
+            out.channels[name], stray, (out.free[name], loose) = without_strays(in_common(found))
+            out.steady[name], stiff = scatter_of(out.channels[name], steady_change(out.channels[name]))
+            out.likelier[name] = out.free[name] if loose > stiff else out.steady[name]
             if stray.y.size:
-                strays[name] = stray
-    return MatchedRuns(channels, free, steady, likelier, strays)
+                out.strays[name] = stray
+    return out

@@ -16,14 +16,8 @@ from bemt import __version__
 from bemt.base.document import Documented
 from bemt.base.errors import InputError
 from bemt.base.tables import number_of, number_text, speed_text, text_table
+from bemt.data.recordings import cfd_setup
 from bemt.data.recordings.cfd_run import is_run
-from bemt.data.recordings.cfd_setup import (
-    GRID_FLOOR_SOURCE,
-    conditions_of,
-    conditions_that_differ,
-    grid_floor,
-    grid_that_differs,
-)
 from bemt.data.recordings.channels import named
 from bemt.judge.compare.one_run import cfd_points, plus_minus
 from bemt.judge.compare.selection import selected
@@ -133,14 +127,14 @@ def compare_runs(a: str, b: str, rows_a: Sequence[str] = (), rows_b: Sequence[st
     try:
         first, second = (selected(import_file(p), list(rows), p) for p, rows in ((a, rows_a), (b, rows_b)))
         rows = {"A": tuple(rows_a), "B": tuple(rows_b)}
-        differ = conditions_that_differ(first, second)
-        if words := grid_that_differs(first, second):
+        differ = cfd_setup.conditions_that_differ(first, second)
+        if words := cfd_setup.grid_that_differs(first, second):
             told = _told_of_grids(words, differ)
             step = "Compare runs on one grid, or state the u of a grid study"
             return TwoRuns((a, b), rows, words, differ, told, step, ratios=_ratios(named(first), named(second)))
         if Path(a).resolve() == Path(b).resolve() and sorted(rows_a) == sorted(rows_b):
             return None  # refused by the comparison
-        if not all(is_run(d) or conditions_of(d) for d in (first, second)):
+        if not all(is_run(d) or cfd_setup.conditions_of(d) for d in (first, second)):
             return None
         x, y = (cfd_points(p, d)[0] for p, d in ((a, first), (b, second)))
     except InputError:  # the comparison says it
@@ -157,12 +151,12 @@ def compare_runs(a: str, b: str, rows_a: Sequence[str] = (), rows_b: Sequence[st
 
 
 def _told_of_grids(words: str, differ: Mapping[str, tuple[str, str]]) -> tuple[str, ...]:
-    thrust, torque = (grid_floor(load, False) for load in ("thrust_N", "torque_Nm"))
+    thrust, torque = (f"{cfd_setup.grid_floor(load, False):.0%}" for load in ("thrust_N", "torque_Nm"))
     also = {k: v for k, v in differ.items() if k not in ("grid_level", "cells")}
     more = "; ".join(f"{k.replace('_', ' ')} {x} and {y}" for k, (x, y) in also.items())
     return (
         f"{words[0].upper()}{words[1:]}. No physics is named before the grid is the same.",
-        f"The next grid alone changes thrust by {thrust:.0%} and torque by {torque:.0%} ({GRID_FLOOR_SOURCE}).",
+        f"The next grid alone changes thrust by {thrust} and torque by {torque} ({cfd_setup.GRID_FLOOR_SOURCE}).",
         *([f"Also: {more}."] if also else []),
     )
 

@@ -14,6 +14,7 @@ from bemt.base import unit_errors
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_text, speed_text
+from bemt.data.readers import load_text, number, slices
 from bemt.physics.air import Air
 from bemt.physics.bem import solver
 from bemt.physics.bem.model import Model, acts_on_points, acts_on_rotor
@@ -120,8 +121,6 @@ def read_blade_loads(path: Path) -> dict[str, BladeLoads]:
 
     Speeds, density and uncertainties that they do not state come from ``recording.csv`` beside it, where there is one.
     """
-    from bemt.data.readers import load_text, number, slices
-
     beside = path.with_name("recording.csv")
     points = {row["run"]: row for row in csv.DictReader(load_text(beside).lines)} if beside.is_file() else {}
 

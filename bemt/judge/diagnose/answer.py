@@ -19,10 +19,8 @@ from bemt.physics import effects
 
 if TYPE_CHECKING:
     from bemt.judge.compare.recordings import RunChange
-    from bemt.judge.diagnose import fit as fitting
-    from bemt.judge.diagnose import form, posterior
+    from bemt.judge.diagnose import form
     from bemt.judge.diagnose import suggest as suggestion
-    from bemt.judge.diagnose.fit import Fit
     from bemt.judge.diagnose.posterior import Evidence
     from bemt.judge.diagnose.problem import Problem
     from bemt.judge.diagnose.signatures import Candidate
@@ -141,15 +139,11 @@ class Location:
         return ends
 
 
-def mismatch(found: Evidence, best: Fit) -> Array:
-    """Recording minus baseline, free of what nuisances take in the light of an explanation, (M,)."""
-    return np.asarray(found.problem.residual - fitting.smooth(found, best))
-
-
-def locate(found: Evidence, best: Fit) -> Location:
+def locate(found: Evidence, best: fitting.Fit) -> Location:
     """Find channel, variable and interval of the mismatch."""
     natural = tuple(v for i in best.ids for v in effects.catalogue()[i].along)
-    return _largest(found, mismatch(found, best), natural)
+    free_of_nuisances = np.asarray(found.problem.residual - fitting.smooth(found, best))
+    return _largest(found, free_of_nuisances, natural)
 
 
 def bare(found: Evidence) -> Location:
@@ -316,7 +310,7 @@ class Posterior:
 class Diagnosis:
     """What is wrong, in named groups; text, JSON, figures and report are views of it."""
 
-    found: posterior.Evidence  # Outcome of the weighing, with the problem in it
+    found: Evidence  # Outcome of the weighing, with the problem in it
     decision: Decision  # Verdict of the evidence in the case
     said: Decision  # What is said in the end: with what the drive says
     best: fitting.Fit  # Leading explanation at its best setting

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemt.base.action import Answered, Told
+from bemt.base.action import Told
 from bemt.base.errors import Fault, InputError, refuse, system_fault
 from bemt.base.given import number, path_text
 from bemt.data.recordings.grids import together
@@ -28,7 +28,7 @@ from bemt.judge.diagnose.document import document, text
 from bemt.judge.diagnose.load import cases_of, load_all
 from bemt.judge.diagnose.record import Record
 from bemt.judge.diagnose.suggest import Given
-from bemt.judge.loss import CLAIMS
+from bemt.judge.loss import CLAIMS, Judged
 from bemt.rotors.case import Case, case_of
 from bemt.rotors.case.words import sorted_out
 from bemt.rotors.propeller import Propeller, rotor_of
@@ -42,7 +42,7 @@ REPEATABILITY_MAX = 20.0
 
 
 @dataclass(frozen=True, eq=False)
-class Answer(Answered):
+class Answer(Judged):
     """Result of a diagnosis, returned by :func:`diagnose`.
 
     Parameters
@@ -91,22 +91,6 @@ class Answer(Answered):
         return f"<answer on {self.propeller.name}: {' '.join((self.verdict, ', '.join(self.effects))).strip()}>"
 
     @property
-    def verdict(self) -> str:
-        """One of none, named, class, sensor, unknown, insufficient."""
-        return self.diagnosis.said.verdict
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """Effects of the verdict; for a class, all members."""
-        return self.diagnosis.said.effects
-
-    @property
-    def probability(self) -> float | None:
-        """How sure the verdict is, as the first line says it; None where nothing was weighed. [1]"""
-        found: float | None = self.document["probability"]
-        return found
-
-    @property
     def text(self) -> str:
         """The answer as text, as on the command line."""
         return "\n\n".join([text(self.diagnosis, lead=self.beside), *(c.text() for c in self.blade.values())])
@@ -119,9 +103,7 @@ class Answer(Answered):
     @property
     def improved(self) -> Propeller | None:
         """The propeller with the named effects switched on; None if nothing was named that can be simulated."""
-        from bemt.judge.diagnose.folder import improved_case
-
-        text = improved_case(self.diagnosis, self.propeller.case, self.propeller.text)
+        text = folder.improved_case(self.diagnosis, self.propeller.case, self.propeller.text)
         return Propeller(case_of(text, self.propeller.case.folder), text) if text else None
 
     def to_pandas(self) -> pd.DataFrame:
@@ -129,10 +111,6 @@ class Answer(Answered):
         import pandas as pd
 
         return pd.DataFrame(self.document["ranking"])
-
-    def _document(self) -> dict[str, Any]:
-        """Schema ``bemt.diagnosis/1``."""
-        return self.document
 
     def plot(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Draw the figures of the answer.
@@ -153,11 +131,8 @@ class Answer(Answered):
             raise InputError(system_fault(error)) from error
 
 
-class OnePoint(Told):
+class OnePoint(Judged, Told):
     """One point, which cannot be diagnosed, beside the model."""
-
-    verdict = "insufficient"
-    effects: tuple[str, ...] = ()
 
 
 def several(given: Any) -> list[Any]:
@@ -213,7 +188,10 @@ def diagnosed(
     except InputError as error:
         if len(records) > 1 or any(f.where != "readings" for f in error.faults) or not isinstance(files[0], str):
             raise
-        found = _one_point(stated, cases[0], given[0] if isinstance(given[0], str) else "", progress)
+        # one point, or grids of one condition: shown beside the model
+        read = [import_file(f) if isinstance(f, str) and len(stated) > 1 else f for f in stated]
+        seen = read[0] if len(read) == 1 else together(read)
+        found = one_run.compare_run(seen, cases[0], progress, given[0] if isinstance(given[0], str) else "")
         lead = f"Too few readings for a diagnosis ({error.faults[0].got}).\n{one_run.text(found)}"
         told = {**found.document(), "verdict": "insufficient", "effects": [], **beside}
         return OnePoint(told, "\n\n".join([lead, *(c.text() for c in blade.values())]))
@@ -224,14 +202,6 @@ def diagnosed(
         folder.write(target, answer, told, cases, figures, made)
     inside = "" if answer.said.verdict in CLAIMS else _inside(records, chosen)
     return Answer(answer, rotor_of(given[0] if len(given) == 1 and cases else cases[0]), told, blade, inside)
-
-
-def _one_point(
-    stated: Sequence[Any], case: Case, called: str, progress: Callable[[str], None] | None
-) -> one_run.RunComparison:
-    """One point, or grids of one condition, cannot be diagnosed: it is shown beside the model."""
-    seen = stated[0] if len(stated) == 1 else together([import_file(f) if isinstance(f, str) else f for f in stated])
-    return one_run.compare_run(seen, case, progress, called)
 
 
 def _inside(records: Sequence[Record], cases: Sequence[Case]) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,25 +12,22 @@ from bemt.base.arrays import Array
 from bemt.judge import loss
 from bemt.judge.compare import recordings
 from bemt.judge.compare.drive_laws import Judgement
-from bemt.judge.compare.matched import LOADS, MARGIN, SESSION, density_change, like_voltage, losses_differ
+from bemt.judge.compare.matched import LOADS, MARGIN, SESSION, StandRun, density_change, like_voltage, losses_differ
+from bemt.judge.compare.recordings import RunChange
+from bemt.judge.compare.smooth_change import Scatter
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import knowledge, posterior, signatures
 from bemt.judge.diagnose.assemble import assemble
 from bemt.judge.diagnose.law_rotor import BLADE_LAWS, LAWS, VARIANTS, CoefficientCurve, LawRotor, Laws, law_part
+from bemt.judge.diagnose.problem import Part, Problem
 from bemt.judge.diagnose.record import CHANNELS, STILL, Record, thinned
+from bemt.judge.diagnose.signatures import Candidate
 from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation
 from bemt.physics import effects
 from bemt.physics.air import Air
 from bemt.physics.bem.model import acts_on_rotor
+from bemt.physics.dataset import Dataset
 from bemt.rotors.model import air_of_points
-
-if TYPE_CHECKING:
-    from bemt.judge.compare.matched import StandRun
-    from bemt.judge.compare.recordings import RunChange
-    from bemt.judge.compare.smooth_change import Scatter
-    from bemt.judge.diagnose.problem import Part, Problem
-    from bemt.judge.diagnose.signatures import Candidate
-    from bemt.physics.dataset import Dataset
 
 MOST = 40
 """Points of a recording that are weighed; more are averaged with alike ones [1]."""
@@ -162,11 +158,10 @@ def records_of(pair: RunChange) -> tuple[Record, Record] | None:
     shift = {c: max(r.shift.get(c, 0.0) for r in (a, b)) for c in channels.values()}
     power = pair.ratios.get("electrical_power_W")
     losses = float(losses_differ(math.log(power.ratio) if power else 0.0))
-    out = [
+    known, test = (
         _record(r, channels, D, rho, max(apart), reference, pair.rotor.likelier, shift, losses)
         for r, rho, reference in ((a, 1.0, True), (b, math.exp(log_ratio), False))
-    ]
-    known, test = out
+    )
     if known is None or test is None:
         return None
     known, test = (_without_strays(r, D) for r in (known, test))

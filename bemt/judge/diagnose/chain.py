@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
-from typing import TYPE_CHECKING
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,27 +14,20 @@ from bemt.base.gaussian.evidence import shares
 from bemt.base.gaussian.whitening import whitener
 from bemt.judge import loss
 from bemt.judge.compare.change_document import ONE_SETUP
+from bemt.judge.compare.recordings import RunChange
 from bemt.judge.diagnose import by_laws, form, knowledge, noise, other_rotor, posterior, signatures
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import suggest as suggestion
 from bemt.judge.diagnose.answer import Diagnosis, locate
 from bemt.judge.diagnose.assemble import build
-from bemt.judge.diagnose.fit import fit, form_covariance
 from bemt.judge.diagnose.knowledge import ALWAYS
 from bemt.judge.diagnose.nuisance import following
-from bemt.judge.diagnose.record import CHANNELS
+from bemt.judge.diagnose.problem import Problem
+from bemt.judge.diagnose.record import CHANNELS, Record
+from bemt.judge.diagnose.signatures import Candidate
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation
 from bemt.physics import effects
-
-if TYPE_CHECKING:
-    from bemt.judge.compare.drive_laws import Judgement
-    from bemt.judge.compare.recordings import RunChange
-    from bemt.judge.diagnose.posterior import Evidence
-    from bemt.judge.diagnose.problem import Problem
-    from bemt.judge.diagnose.record import Record
-    from bemt.judge.diagnose.signatures import Candidate
-    from bemt.judge.explanation import Explanation
-    from bemt.rotors.case import Case
+from bemt.rotors.case import Case
 
 __all__ = ["MOTOR", "Diagnosis", "diagnose"]
 
@@ -62,12 +54,10 @@ def diagnose(
     turns = [(r.only((speed,)), c) for r, c in told if speed in r.measured and baseline == "bemt"]
     gone = {*given.ruled_out, *(() if only is None else effects.catalogue().keys() - set(only))}
 
-    def judged(pair: RunChange) -> Judgement:
-        return by_laws.judged(pair, only, given.ruled_out)
-
     def compared(absent: Collection[str]) -> RunChange | None:
         if channels is not None or baseline != "bemt":
             return None
+        judged = partial(by_laws.judged, only=only, gone=given.ruled_out)
         return change or knowledge.change_of(records, each[0].diameter_m, absent, judged)
 
     def chain(
@@ -163,9 +153,7 @@ def _decided(P: Mapping[Explanation, float], plain: Mapping[Explanation, float])
 def _with_drive(rotor: Diagnosis, motor: Diagnosis) -> Diagnosis:
     """Answer on loads and drive, measured apart: loads at the measured speed, the speed at the pulse width."""
     P, Q = loss.parts(rotor.found.probability, _of_motor(motor.found))
-    loads, drive = loss.decide(P), _decided(Q, motor.found.probability)
-    if (loads.verdict, loads.effects) == (rotor.said.verdict, rotor.said.effects):
-        loads = replace(loads, why=rotor.said.why)
+    loads, drive = loss.decide(P).reasoned_as(rotor.said), _decided(Q, motor.found.probability)
     said = loss.joined(loads, drive, P.get(NONE, 0.0))
     if said.by == "drive":
         return replace(motor, said=said, drive=motor, loads=rotor, absent=rotor.absent)
@@ -334,7 +322,7 @@ def partitions(problem: Problem, most: int = 6) -> list[tuple[str, NDArray[np.in
     return [(f"intervals of {name}", whole(rank * min(4, count) // count))]
 
 
-def held_out(found: Evidence, what: Explanation) -> tuple[str, Array, Array]:
+def held_out(found: posterior.Evidence, what: Explanation) -> tuple[str, Array, Array]:
     """Predict every block from the others, with and without an explanation."""
     problem = found.problem
     words, block = partitions(problem)[0]
@@ -346,7 +334,7 @@ def held_out(found: Evidence, what: Explanation) -> tuple[str, Array, Array]:
     r = problem.residual
     after, smooth_part = np.array(problem.centre), np.array(problem.centre)
     systematic = C - hyper.scale**2 * noise.noise(problem, hyper.ar)
-    own = form_covariance(found, fit(found, what))
+    own = fitting.form_covariance(found, fitting.fit(found, what))
     for b in np.unique(member[member != REFERENCE]):
         test, train = member == b, member != b
         if not train.any():
@@ -363,7 +351,7 @@ def held_out(found: Evidence, what: Explanation) -> tuple[str, Array, Array]:
     return words, after, smooth_part
 
 
-def _columns(found: Evidence, what: Explanation) -> tuple[Array, Array]:
+def _columns(found: posterior.Evidence, what: Explanation) -> tuple[Array, Array]:
     """Signatures of an explanation; of a pair the settings near the best one."""
     M = found.problem.y.size
     ids = tuple(what)
@@ -372,7 +360,7 @@ def _columns(found: Evidence, what: Explanation) -> tuple[Array, Array]:
     if len(ids) == 1:
         c = found.of(ids[0])
         return c.signatures, np.log(c.weight)
-    best = fit(found, what)
+    best = fitting.fit(found, what)
     a, b = (found.of(i) for i in ids)
     i, j = (col - found.spans[k].start for col, k in zip(best.columns, ids, strict=True))
     interaction = best.signature - a.signatures[:, i] - b.signatures[:, j]

@@ -12,22 +12,33 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bemt.base.action import Answered, Told
+from bemt.base.action import Told
 from bemt.base.document import rows_of
-from bemt.base.errors import Fault, InputError, gathered, refuse
+from bemt.base.errors import Fault, InputError
+from bemt.base.page import FIRST
+from bemt.base.tables import json_text, write_atomic
+from bemt.base.units import INCH
+from bemt.data.recordings.check import OPEN_OR_OUT, check, left_out
+from bemt.data.recordings.load import as_stated, import_file, stated_options
+from bemt.judge.compare import one_run, two_runs
 from bemt.judge.compare.change_document import DIAGNOSED, ComparedRuns, RankedCause, document, next_step, text
 from bemt.judge.compare.matched import stand_run
 from bemt.judge.compare.recordings import RunChange
 from bemt.judge.compare.selection import Invocation, conditions_of, selected, with_air
 from bemt.judge.diagnose.by_laws import changed
+from bemt.judge.diagnose.load import at_once, is_table, load, load_all
+from bemt.judge.diagnose.record import from_series
+from bemt.judge.diagnose.suggest import Given
+from bemt.judge.loss import Judged
+from bemt.physics.dataset import Dataset, from_pandas
 from bemt.rotors.propeller import Propeller, rotor_of
+from geometry.common import GeometryError
+from geometry.designation import parse_designation
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from bemt.data.recordings.findings import Finding
-    from bemt.judge.diagnose.suggest import Given
-    from bemt.physics.dataset import Dataset
     from bemt.rotors.case import Case
 
 # Remarks on the files come first in an explanation; `import` shows them.
@@ -37,11 +48,9 @@ _STUCK = "constant_column"
 # Rows and number of the values of a column that tells parts of one file apart.
 _ROWS, _KINDS = 3, 20
 
-__all__ = ["Contrast", "compare", "label_diameter"]
-
 
 @dataclass(frozen=True, eq=False)
-class Contrast(Answered):
+class Contrast(Judged):
     """What changed between two recordings.
 
     Attributes
@@ -61,21 +70,6 @@ class Contrast(Answered):
         return self.said.document()
 
     @property
-    def verdict(self) -> str:
-        """none, named, sensor, class, unknown or insufficient."""
-        return self.said.verdict
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """Effects of the verdict; of a class all members."""
-        return self.said.effects
-
-    @property
-    def probability(self) -> float | None:
-        """Probability of the verdict [1]; None without one."""
-        return self.said.probability
-
-    @property
     def text(self) -> str:
         """The answer on one screen."""
         return text(self.said)
@@ -84,9 +78,6 @@ class Contrast(Answered):
     def details(self) -> str:
         """The answer with its ranking, sub-systems and all notes."""
         return text(self.said, details=True)
-
-    def _document(self) -> dict[str, Any]:
-        return self.document
 
     def to_pandas(self) -> pd.DataFrame:
         """A row for each channel that both recorded: ``ratio`` of B over A, its ends and how it changes along n."""
@@ -122,9 +113,6 @@ def compare(
     Loads are compared as load / (rho n^2) on a smooth curve over ln n and V/(n D), by Gaussian processes (Rasmussen and
     Williams 2006, eq. 2.23 to 2.24 and 2.37 to 2.42). Density counts where both recordings tell it.
     """
-    from bemt.data.recordings.load import stated_options
-    from bemt.judge.diagnose.load import is_table
-
     names = ["A" if is_table(a) else os.fspath(a), "B" if is_table(b) else os.fspath(b)]
     D = label_diameter(label) if diameter_m is None else diameter_m
     rotor = None if case is None else rotor_of(case).case
@@ -134,22 +122,15 @@ def compare(
     if (a is b or Path(names[0]).resolve() == Path(names[1]).resolve()) and sorted(rows_a) == sorted(rows_b):
         expected = "two recordings, or two choices of rows"
         raise InputError(Fault(names[0], "", "the same recording twice", expected, _two_choices(names[0])))
-    read: list[Dataset] = []
-    faults: list[Fault] = []
-    for given, name, rows, air, letter in ((a, names[0], rows_a, air_a, "a"), (b, names[1], rows_b, air_b, "b")):
-        with gathered(faults):
-            read.append(with_air(selected(_read(given, name, run or {}), list(rows), name), air, f"--air-{letter}"))
-    refuse(faults)
+    read: list[Dataset] = at_once(partial(_read, a, names[0], rows_a, air_a, "--air-a", run or {}),
+                                  partial(_read, b, names[1], rows_b, air_b, "--air-b", run or {}))  # fmt: skip
     D = rotor.diameter_m if rotor is not None and D is None else D
     rho = None if rotor is None else float(rotor.air().rho)
     findings = [_findings(imported, D, rotor is not None and rotor.ducted, rho) for imported in read]
     read = [_sound(imported, found) for imported, found in zip(read, findings, strict=True)]
-    runs = []
-    for name, rows, imported in zip(names, (rows_a, rows_b), read, strict=True):
-        with gathered(faults):
-            runs.append(stand_run(imported, f"{name} ({', '.join(rows)})" if rows else name, D))
-    refuse(faults)
-    found = changed(runs[0], runs[1], math.nan if D is None else D)
+    told = [f"{name} ({', '.join(rows)})" if rows else name for name, rows in zip(names, (rows_a, rows_b), strict=True)]
+    one, two = at_once(*(partial(stand_run, imported, name, D) for imported, name in zip(read, told, strict=True)))
+    found = changed(one, two, math.nan if D is None else D)
     said = document(found)
     if rotor is not None and not (found.wind or found.without_speed):
         said = _diagnosed(said, asked, read, rotor, found, progress)
@@ -159,15 +140,12 @@ def compare(
     ))  # fmt: skip
 
 
-def _read(given: Any, name: str, run: Mapping[str, Any]) -> Dataset:
+def _read(given: Any, name: str, rows: Sequence[str], air: str | None, option: str, run: Mapping[str, Any]) -> Dataset:
     """A recording as the user states it."""
-    from bemt.data.recordings.load import as_stated, import_file
-    from bemt.judge.diagnose.load import is_table
-    from bemt.physics.dataset import Dataset, from_pandas
-
     told = as_stated([given if is_table(given) else name], {k: v for k, v in run.items() if k != "rpm"})[0]
     made = from_pandas(told, name=name) if hasattr(told, "columns") else told
-    return made if isinstance(made, Dataset) else import_file(name)
+    made = made if isinstance(made, Dataset) else import_file(name)
+    return with_air(selected(made, list(rows), name), air, option)
 
 
 def _next(said: ComparedRuns, change: RunChange, asked: Invocation) -> Mapping[str, Any]:
@@ -183,25 +161,19 @@ def compared(
     progress: Callable[[str], None] | None, run: Mapping[str, Any] | None = None,
 ) -> Contrast | Told:  # fmt: skip
     """One CFD run beside a case, two grids of a run, two CFD runs, or two recordings; written if a folder is given."""
-    from bemt.data.recordings.load import as_stated
-    from bemt.judge.compare import one_run, two_runs
-    from bemt.judge.diagnose.load import is_table
-
-    two = partial(compare, a, b, case, label=label, diameter_m=diameter_m, rows_a=rows_a, rows_b=rows_b, air_a=air_a,
-                  air_b=air_b, progress=progress, run=run)  # fmt: skip
     found: Contrast | Told
+    tables = is_table(a) or is_table(b)
     if b is None:
         if case is None:
             hint = "Two recordings, A B, need none"
             raise InputError(Fault("--case", "", "one recording and no case", "the case to compare it with", hint))
         one = one_run.compare_run(as_stated([a], run or {})[0], case, progress)
         found = Told(one.document(), one_run.text(one), one_run.text(one, details=True))
-    elif is_table(a) or is_table(b):
-        found = two()
-    elif (runs := two_runs.compare_runs(a, b, rows_a, rows_b)) is not None:
+    elif not tables and (runs := two_runs.compare_runs(a, b, rows_a, rows_b)) is not None:
         found = Told(runs.document(), runs.text)
     else:
-        found = two()
+        found = compare(a, b, case, label=label, diameter_m=diameter_m, rows_a=rows_a, rows_b=rows_b, air_a=air_a,
+                        air_b=air_b, progress=progress, run=run)  # fmt: skip
     if out is not None:
         beside = case if figures and not (rows_a or rows_b or air_a or air_b) else None
         _write(Path(out), found, figures, [name for name in (a, b) if name is not None], beside)
@@ -210,10 +182,7 @@ def compared(
 
 def _write(out: Path, found: Contrast | Told, figures: bool, files: Sequence[str], case: Any) -> None:
     """Write comparison.json, its text, a picture, and the recordings inside the prediction band of the case."""
-    from bemt.base.page import FIRST
-    from bemt.base.tables import json_text, write_atomic
     from bemt.judge.diagnose.figures import first_picture
-    from bemt.judge.diagnose.load import load_all
 
     out.mkdir(parents=True, exist_ok=True)
     write_atomic(out / "comparison.json", json_text(found.to_dict()))
@@ -229,8 +198,6 @@ def _findings(
     imported: Dataset, diameter_m: float | None, ducted: bool, density_kg_m3: float | None
 ) -> tuple[Finding, ...]:
     """What cannot be so in a recording, what it leaves open or out, as ``import`` and ``diagnose`` find it."""
-    from bemt.data.recordings.check import OPEN_OR_OUT, check
-
     of_rotor = {"diameter_m": diameter_m, "density_kg_m3": density_kg_m3}
     found = check(imported, ducted=ducted, **of_rotor) if imported.kind in ("bench", "table") else ()
     # a propeller that windmills pulls the other way; signs have a note of their own
@@ -239,8 +206,6 @@ def _findings(
 
 def _sound(imported: Dataset, findings: Sequence[Finding]) -> Dataset:
     """The recording without readings, and columns, that are no measurement."""
-    from bemt.data.recordings.check import left_out
-
     imported, gone = left_out(imported, findings), {f.channel for f in findings if f.id == _STUCK}
     if not gone:
         return imported
@@ -261,8 +226,6 @@ def _errors(findings: Sequence[Sequence[Finding]]) -> list[str]:
 
 def _two_choices(name: str) -> str:
     """How to choose two parts of one file, with a column that tells them apart."""
-    from bemt.data.recordings.load import import_file
-
     how = "Its scatter would count as agreement"
     try:
         found = import_file(name)
@@ -285,8 +248,6 @@ def _diagnosed(
     from bemt.judge.diagnose.chain import diagnose
     from bemt.judge.diagnose.document import document as diagnosis
     from bemt.judge.diagnose.document import explanation
-    from bemt.judge.diagnose.load import load
-    from bemt.judge.diagnose.record import from_series
 
     a, b = (
         load(name, case, imported) if "format" in imported.provenance else from_series(imported, case)
@@ -304,7 +265,6 @@ def _diagnosed(
 
 def _given(asked: Invocation) -> Given:
     """Commands of the diagnosis that carry what was asked; rows and air are taken by a comparison alone."""
-    from bemt.judge.diagnose.suggest import Given
 
     class _Pair(Given):
         def command(self, run: str = "", reference: str = "", ruled_out: str = "") -> str:
@@ -325,10 +285,6 @@ def _given(asked: Invocation) -> Given:
 
 def label_diameter(label: str | None) -> float | None:
     """Diameter of a label such as 10x5 [m]."""
-    from bemt.base.units import INCH
-    from geometry.common import GeometryError
-    from geometry.designation import parse_designation
-
     if label is None:
         return None
     try:

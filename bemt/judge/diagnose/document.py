@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from bemt import __version__
 from bemt.base.tables import or_null, text_table
@@ -13,7 +13,7 @@ from bemt.judge.compare.change_document import WORD, families
 from bemt.judge.compare.drive_laws import title_of
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import other_rotor
-from bemt.judge.diagnose.answer import POWER, bare, share
+from bemt.judge.diagnose.answer import POWER, Diagnosis, bare, share
 from bemt.judge.diagnose.form import nearest
 from bemt.judge.diagnose.posterior import LEAST
 from bemt.judge.diagnose.record import DROPPED, NO_SPEED, POWER_OPEN
@@ -21,12 +21,9 @@ from bemt.judge.diagnose.suggest import LEVEL
 from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation, Size
 from bemt.judge.loss import CLAIMS, ways
 from bemt.physics import effects
+from bemt.physics.effects import Parameter
 from bemt.physics.effects.propeller import AnotherPropeller
 from bemt.rotors.case.fresh import OPEN_ENDINGS
-
-if TYPE_CHECKING:
-    from bemt.judge.diagnose.answer import Diagnosis
-    from bemt.physics.effects import Parameter
 
 SCHEMA = "bemt.diagnosis/1"
 _OPEN = 0.95  # share of a parameter's range that its interval may take before nothing is said of it [1]
@@ -68,7 +65,7 @@ def document(d: Diagnosis) -> dict[str, Any]:
         "classes": d.alike.classes(),
         "next_measurement": d.next.document(),
         "p_value": d.p_value,
-        "log_bayes": {str(e): found.log_bayes(e) for e in (*map(Explanation.of, found.spans), UNKNOWN)},
+        "log_bayes": {str(e): odds for e, odds in d.posterior.log_bayes.items()},
         "nearest_signature": nearest(found),
         "visibility": {i: float(s) for i, s in zip(d.alike.ids, d.alike.size, strict=True)},
         "covariance": {"noise_scale": hyper.scale, "correlation": hyper.ar, "solver_error": hyper.model},
@@ -106,8 +103,7 @@ def _gain(d: Diagnosis) -> str:
             f"{d.words[channel]} {s['holdout_before'] / most:.1%} before, {s['holdout_after'] / most:.1%} "
             f"after (noise {s['noise'] / most:.1%}, smooth fit without physics {s['gp_only'] / most:.1%})"
         )
-    head = f"Predicting {d.blocks} it was not fitted to, the error in % of the largest value is: "
-    return head + "; ".join(words) + "."
+    return f"Predicting {d.blocks} it was not fitted to, the error in % of the largest value is: {'; '.join(words)}."
 
 
 def _parameters(d: Diagnosis) -> str:
@@ -142,28 +138,20 @@ def _sized(p: Parameter, value: float, form: str = ".3g") -> str:
     return f"{value:{form}}" if p.unit in ("1", "") else f"{value:{form}} {p.unit}"
 
 
-def _title(d: Diagnosis, name: str) -> str:
-    """Title of an effect, and in which state it is, if that is not its usual one."""
-    cls, found = effects.catalogue().get(name), d.parameters.get(name, {}).get("state")
-    if cls is None or found is None or found.value == cls().state:  # type: ignore[attr-defined]
-        return title_of(name)
-    return f"{cls.title} ({found.value})"
-
-
-def _with_size(d: Diagnosis, name: str) -> str:
-    """Title of a named effect and, where one number is its size, that number."""
-    cls, found = effects.catalogue().get(name), d.parameters.get(name, {})
-    if cls is None:
-        return title_of(name)
-    if cls.fault == "unit" and "unit" in found:
-        return f"{cls.title} ({found['channel'].value}: {found['unit'].value})"
-    if (state := _title(d, name)) != cls.title:
-        return state
-    sizes = [p for p in cls.parameters if p.off is not None and p.steps and p.name in found]
+def _title(d: Diagnosis, name: str, sized: bool = False) -> str:
+    """Title of an effect, with its state if that is not the usual one; ``sized``: where one number is its size, it."""
+    title, cls, found = title_of(name), effects.catalogue().get(name), d.parameters.get(name, {})
+    if cls is None or title != cls.title:  # of a law of the drive
+        return title
+    if sized and cls.fault == "unit" and "unit" in found:
+        return f"{title} ({found['channel'].value}: {found['unit'].value})"
+    if "state" in found and found["state"].value != cls().state:  # type: ignore[attr-defined]
+        return f"{title} ({found['state'].value})"
+    sizes = [p for p in cls.parameters if sized and p.off is not None and p.steps and p.name in found]
     value = found[sizes[0].name].value if len(sizes) == 1 else None
     if not isinstance(value, float) or (sizes[0].unit == "1" and not _is_share(sizes[0])):
-        return cls.title
-    return f"{cls.title} ({_sized(sizes[0], value, '+.3g')})"
+        return title
+    return f"{title} ({_sized(sizes[0], value, '+.3g')})"
 
 
 def _in_units(d: Diagnosis, name: str, parameter: str, value: float) -> str:
@@ -260,9 +248,9 @@ def _with_cause(d: Diagnosis) -> list[str]:
         signs = "; ".join(known[i].sign for i in said.effects if i in known and known[i].sign)
         words = [f"{named}: {told}." if told else f"{named}.", *([f"Signature: {signs}."] if signs else [])]
     elif said.verdict == "class":
-        lead = "One of these" if len(said.sets) < 2 else f"{said.why[0].upper()}{said.why[1:]}"
-        one_cause = len(said.sets) < 2
-        listed = [_both(d, k) for k in _ways(d)] if one_cause else [_title(d, i) for i in said.effects]
+        lead, listed = "One of these", [_both(d, k) for k in _ways(d)]
+        if len(said.sets) > 1:  # more than one cause
+            lead, listed = f"{said.why[0].upper()}{said.why[1:]}", [_title(d, i) for i in said.effects]
         words = [f"{lead} ({said.probability:.2f}): {', '.join(listed)}."]
     elif said.verdict == "unknown":
         words = [f"The cause is not in the library: {said.why}. It shows in {d.found.states[0].best_rival}."]
@@ -318,7 +306,9 @@ def headline(d: Diagnosis) -> str:
     if said.verdict in CLAIMS:
         moved = ", ".join(f"{name} {share(v)}" for name, v in _ratios(d))
         against = f" ({moved} against the reference)" if moved else ""
-        return f"{_of_class(d) if said.verdict == 'class' else _of_name(d)}{against}{_in_both(d)}."
+        stand = " in the stand, not the air" if said.verdict == "sensor" else ""
+        what = _of_class(d) if said.verdict == "class" else f"Cause found{stand}: {_both(d, said.effects, True)}"
+        return f"{what}{against}{_in_both(d)}."
     if said.verdict == "insufficient" and (other_rotor.foreign(d.problem) or other_rotor.doubted(d.problem, said)):
         return f"These are not the loads of this case ({_off(d)}): check diameter, blades, units and speed first."
     file, wrong, _ = other_rotor.contradiction(d.problem)
@@ -342,11 +332,6 @@ def _agreement(d: Diagnosis) -> str:
     return "Recording and model agree within noise, calibration and the uncertainty of the model."
 
 
-def _of_name(d: Diagnosis) -> str:
-    where = " in the stand, not the air" if d.said.verdict == "sensor" else ""
-    return f"Cause found{where}: {' and '.join(_with_size(d, i) for i in d.said.effects)}"
-
-
 def _of_class(d: Diagnosis) -> str:
     said = d.said
     titles = [_title(d, i) for i in said.effects]
@@ -358,8 +343,7 @@ def _of_class(d: Diagnosis) -> str:
     if len(titles) > _A_GROUP:
         return f"{len(titles)} causes look alike in these readings: {families(said.effects)}"
     first, *others = _ways(d)
-    lead = _both(d, first) if first.pair else _with_size(d, *first)
-    lead += f", probability {d.found.probability.get(first, 0.0):.2f}"
+    lead = f"{_both(d, first, not first.pair)}, probability {d.found.probability.get(first, 0.0):.2f}"
     between = ", or " if any(k.pair for k in others) else " or "
     return (
         f"The cause is {lead}, or {between.join(_both(d, k) for k in others)}; these readings cannot distinguish them"
@@ -372,9 +356,9 @@ def _ways(d: Diagnosis) -> list[Explanation]:
     return ways(d.said.effects, sorted(P, key=lambda k: -P[k]))
 
 
-def _both(d: Diagnosis, what: Explanation) -> str:
+def _both(d: Diagnosis, what: Iterable[str], sized: bool = False) -> str:
     """Titles of the effects that an explanation has at work together."""
-    return " and ".join(_title(d, i) for i in what)
+    return " and ".join(_title(d, i, sized) for i in what)
 
 
 def _off(d: Diagnosis) -> str:

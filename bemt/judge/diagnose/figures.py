@@ -18,16 +18,14 @@ from bemt.base.page import FIRST
 from bemt.base.tables import write_atomic
 from bemt.judge.compare.first_picture import LABEL, PredictionView, against_band
 from bemt.judge.diagnose import figures_effects
-from bemt.judge.diagnose.answer import CHANNEL_WORDS
+from bemt.judge.diagnose.answer import CHANNEL_WORDS, Diagnosis
 from bemt.judge.diagnose.document import headline
-from bemt.judge.diagnose.record import CHANNELS
+from bemt.judge.diagnose.record import CHANNELS, Record
 from bemt.physics.dataset import Dataset
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from bemt.judge.diagnose.answer import Diagnosis
-    from bemt.judge.diagnose.record import Record
     from bemt.rotors.case import Case
 
 Index = NDArray[np.intp]
@@ -200,20 +198,19 @@ def _map(answer: Diagnosis, x: str, y: str) -> Figure:
         here, e = _shares(answer, c)
         at = problem.point[here]
         axis.axhline(0.0, color=GREY, linewidth=0.8)
-        span = next((s for n in (x, y) if (s := _located(answer, c, n)) is not None), None)
-        if span is not None and answer.marked is not None and answer.marked.variable == x:
-            axis.axvspan(*span, facecolor=ORANGE, alpha=0.25, edgecolor="none", zorder=1)
+        along, across = (_located(answer, c, n) for n in (x, y))
+        if along:
+            axis.axvspan(*along, facecolor=ORANGE, alpha=0.25, edgecolor="none", zorder=1)
         for k, colour in zip(groups, _SHADES, strict=False):
             own = line[at] == k
             if not own.any():
                 continue
             value = problem.covariates[y][at][own]
-            marked = span is not None and answer.marked is not None and answer.marked.variable == y
-            inside = marked and bool(np.all((value >= span[0]) & (value <= span[1]))) if span else False
+            inside = across is not None and bool(np.all((value >= across[0]) & (value <= across[1])))
             curve = _curve(problem.covariates[x][at][own], e[own])
             axis.plot(problem.covariates[x][at][own], e[own], ".", color=colour, markersize=4)
             axis.plot(*curve, color=colour, linewidth=_BOLD if inside else 1.5, label=_label(y, value))
-        axis.set(title=_title(_heading(answer, c, span is not None), len(channels)), xlabel=_AXIS.get(x, x))
+        axis.set(title=_title(_heading(answer, c, bool(along or across)), len(channels)), xlabel=_AXIS.get(x, x))
         axis.margins(0.05)
     axes[0, 0].set_ylabel(_shown(answer))
     handles, labels = axes[0, 0].get_legend_handles_labels()
@@ -408,18 +405,13 @@ def points_of(record: Record) -> Dataset:
 def first_picture(records: Sequence[Record], cases: Sequence[Case]) -> list[PredictionView]:
     """Put records beside their cases, one view a case; ``cases`` are one for all records, or one for each."""
     each = list(cases) * len(records) if len(cases) == 1 else list(cases)
-    groups: dict[str, tuple[Case, list[Dataset]]] = {}
-    bare: dict[str, list[str]] = {}
+    groups: dict[str, tuple[Case, list[Record]]] = {}
     for record, case in zip(records, each, strict=True):
-        groups.setdefault(str(case.path.resolve()), (case, []))[1].append(points_of(record))
-        bare.setdefault(str(case.path.resolve()), []).extend([] if record.air_recorded else [record.name])
-    views = [against_band(case, points) for case, points in groups.values()]
-    told = {key: f"No density recorded{_of_some(bare[key], len(points))}: {case.air().rho:.4g} kg/m³, that of the case."
-            for key, (case, points) in groups.items() if bare[key]}  # fmt: skip
-    return [replace(view, notes=(*([told[key]] if key in told else []), *view.notes))
-            for key, view in zip(groups, views, strict=True)]  # fmt: skip
-
-
-def _of_some(bare: Sequence[str], of: int) -> str:
-    """Which recordings have no density, where others have."""
-    return f" in {' and '.join(bare)}" if len(bare) < of else ""
+        groups.setdefault(str(case.path.resolve()), (case, []))[1].append(record)
+    views = []
+    for case, own in groups.values():
+        view, bare = against_band(case, list(map(points_of, own))), [r.name for r in own if not r.air_recorded]
+        some = f" in {' and '.join(bare)}" if len(bare) < len(own) else ""
+        told = [f"No density recorded{some}: {case.air().rho:.4g} kg/m³, that of the case."] if bare else []
+        views.append(replace(view, notes=(*told, *view.notes)))
+    return views

@@ -14,7 +14,7 @@ from bemt.base.canvas import BLACK, BLUE, GREY, ORANGE, PURPLE, RED, SKY, blank
 from bemt.judge.diagnose import form
 from bemt.judge.diagnose.fit import fit, weights
 from bemt.judge.diagnose.record import CHANNELS
-from bemt.judge.diagnose.signatures import Setting, effect_of
+from bemt.judge.diagnose.signatures import Candidate, Setting, effect_of
 from bemt.judge.explanation import NONE, Explanation, Size
 from bemt.physics.bem import model as bem
 from bemt.physics.bem import solver
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from bemt.judge.diagnose.answer import Diagnosis
-    from bemt.judge.diagnose.signatures import Candidate
     from bemt.physics.air import Air
 
 _MOST_EFFECTS, _MOST_BARS = 10, 8
@@ -227,11 +226,6 @@ class _Panel:
         own = {k for k in _keys(self.candidate) if _numeric(self.candidate, k)} if self.keys else set()
         return [_words({k: v for k, v in s.items() if k not in own}) for s in self.candidate.settings]
 
-    def range(self, key: str) -> tuple[float, float]:
-        """Prior range of a parameter."""
-        x = self.values(key)
-        return float(x.min()), float(x.max())
-
     def label(self, key: str) -> str:
         known = {q.name: q.unit for q in type(effect_of(self.candidate.id, self.candidate.settings[0])).parameters}
         return f"{self.candidate.id}: {key} [{known.get(key, '1')}]"
@@ -274,15 +268,15 @@ def posterior(answer: Diagnosis) -> Figure | None:
 def _panels(candidate: Candidate, p: Array, intervals: Mapping[str, Size]) -> list[_Panel]:
     if len(candidate.settings) < 2:
         return []
-    numbers = [k for k in _keys(candidate) if _numeric(candidate, k)]
-    numbers = [k for k in numbers if len({s[k] for s in candidate.settings}) >= 3]
+    sizes = {k: len({s[k] for s in candidate.settings}) for k in _keys(candidate) if _numeric(candidate, k)}
+    numbers = tuple(k for k, size in sizes.items() if size >= 3)
     words = {_words({k: v for k, v in s.items() if k not in numbers}) for s in candidate.settings}
+    keys: list[tuple[str, ...]] = [(k,) for k in numbers]
     if not numbers or len(words) * 2 > len(candidate.settings):
-        return [_Panel(candidate, p, (), intervals)]
-    sizes = [len({s[k] for s in candidate.settings}) for k in numbers]
-    if len(numbers) == 2 and len(words) == 1 and sizes[0] * sizes[1] == p.size:
-        return [_Panel(candidate, p, tuple(numbers), intervals)]
-    return [_Panel(candidate, p, (k,), intervals) for k in numbers]
+        keys = [()]
+    elif len(numbers) == 2 and len(words) == 1 and sizes[numbers[0]] * sizes[numbers[1]] == p.size:
+        keys = [numbers]
+    return [_Panel(candidate, p, k, intervals) for k in keys]
 
 
 def _bars(axis: Axes, panel: _Panel) -> None:
@@ -338,16 +332,17 @@ def _map(axis: Axes, panel: _Panel) -> None:
     if order[-1] < level < order[0]:
         axis.contour(gx, gy, table, levels=[level], colors=[BLACK], linewidths=1.0)
         axis.plot([], [], color=BLACK, linewidth=1.0, label="90 % region")
-    for k, key in enumerate((a, b)):
-        inside, (low, high) = panel.intervals.get(key), panel.range(key)
+    for k, (key, grid) in enumerate(((a, gx), (b, gy))):
+        inside = panel.intervals.get(key)
         mark = axis.axvline if k == 0 else axis.axhline
         if inside:  # a bar at the edge of the panel, so that the map keeps its colours
             ends, edge = [inside.low, inside.high], [0.99 if k == 0 else 0.005] * 2
             frame = axis.get_xaxis_transform() if k == 0 else axis.get_yaxis_transform()
             axis.plot(*((ends, edge) if k == 0 else (edge, ends)), color=ORANGE, linewidth=5.0, transform=frame,
                       solid_capstyle="butt", label="90 % interval of one" if k == 0 else None)  # fmt: skip
-        for end in (low, high):
-            mark(end, color=GREY, linestyle=":", linewidth=1.2, label="prior range" if k == 0 and end == low else None)
+        for end in (grid[0], grid[-1]):
+            mark(end, color=GREY, linestyle=":", linewidth=1.2,
+                 label="prior range" if k == 0 and end == grid[0] else None)  # fmt: skip
     axis.set(xlabel=panel.label(a), ylabel=panel.label(b))
     axis.locator_params(axis="x", nbins=5)
     axis.legend(loc="upper right", frameon=True, framealpha=0.85, edgecolor="none")

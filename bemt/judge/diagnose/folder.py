@@ -6,21 +6,19 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import tomlkit
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, write_atomic
+from bemt.judge.diagnose import figures as pictures
+from bemt.judge.diagnose.answer import Diagnosis
 from bemt.judge.diagnose.document import text
 from bemt.judge.diagnose.signatures import effect_of
 from bemt.physics import effects
 from bemt.physics.bem import model as bem
-from bemt.rotors.case import repeated_names
-
-if TYPE_CHECKING:
-    from bemt.judge.diagnose.answer import Diagnosis
-    from bemt.rotors.case import Case
+from bemt.rotors.case import Case, repeated_names
 
 
 def write(
@@ -37,8 +35,6 @@ def write(
     for file, content in improved.items():
         write_atomic(file, content)
     if figures:
-        from bemt.judge.diagnose import figures as pictures
-
         pictures.draw(answer, out, cases)
 
 
@@ -54,8 +50,9 @@ def _targets(out: Path, cases: Sequence[Case]) -> dict[Path, Case]:
 
 
 def _written(file: Path) -> bool:
-    """Whether a case file is an improved one."""
-    return file.is_file() and is_improved(file.read_text(encoding="utf-8", errors="replace"))
+    """Whether a case file was written here, not by hand."""
+    first = file.read_text(encoding="utf-8", errors="replace").partition("\n")[0] if file.is_file() else ""
+    return first.startswith("#") and _HEAD in first
 
 
 def check(folder: str | None, cases: Sequence[Case]) -> None:
@@ -91,9 +88,7 @@ def _forget(out: Path, cases: Sequence[Case]) -> None:
             file.unlink()
 
 
-def _improved(
-    out: Path, answer: Any, cases: Sequence[Case], texts: Sequence[str]
-) -> dict[Path, bytes | str]:  # fmt: skip
+def _improved(out: Path, answer: Any, cases: Sequence[Case], texts: Sequence[str]) -> dict[Path, bytes | str]:
     """The cases with what was found on, cases that `sweep` runs, as files and their content; case.toml last."""
     told = {c.path.resolve(): text for c, text in zip(cases, texts, strict=False)}
     files: dict[Path, bytes | str] = {}
@@ -160,9 +155,3 @@ def elsewhere(node: Any, case: Case) -> None:
                 node[key] = (case.folder / value).resolve().as_posix()
         elif isinstance(value, (dict, list)):
             elsewhere(value, case)
-
-
-def is_improved(source: str) -> bool:
-    """Whether a case file was written here, not by hand."""
-    first = source.partition("\n")[0]
-    return first.startswith("#") and _HEAD in first

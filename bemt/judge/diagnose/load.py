@@ -9,30 +9,31 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from bemt.base.errors import Fault, InputError, gathered, refuse
 from bemt.base.packed import part_of
+from bemt.base.tables import few
 from bemt.base.units import ZERO_CELSIUS
+from bemt.data.recordings.cfd_run import is_run, of_rotor, run_at
+from bemt.data.recordings.cfd_setup import one_grid, stated_setup
 from bemt.data.recordings.channels import file_name, named, stated
 from bemt.data.recordings.check import check, left_out, without_current
-from bemt.judge.compare.selection import one_rotor, speed_in_doubt, wind_of
+from bemt.data.recordings.grids import are_grids, together
+from bemt.data.recordings.reduce import reduce, reduction
+from bemt.judge.compare.selection import LOAD_CHANNELS, one_rotor, speed_in_doubt, wind_of
 from bemt.judge.diagnose import record as records
+from bemt.judge.diagnose.record import Record
 from bemt.physics import effects
 from bemt.physics.air import Air
 from bemt.physics.dataset import Dataset, from_pandas
-from bemt.rotors.case import find_cases, load_case
+from bemt.rotors.case import Case, find_cases, load_case
 from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.propeller import rotor_of
 
-if TYPE_CHECKING:
-    from bemt.judge.diagnose.record import Record
-    from bemt.rotors.case import Case
-
 _POINT = ("rpm", "J", "airspeed_m_s", "density_kg_m3", "sideslip_deg", *records.COVARIATES)
-_LOADS = ("CT", "CP", "CQ", "thrust_N", "torque_Nm", "power_W")
 # Share by which a stated diameter or advance ratio may differ from the case's; advance ratios that are as good as none.
 _SAME, _SLOW = 0.05, 0.02
 _NAMED = 8
@@ -65,10 +66,7 @@ def load(
     airspeed_m_s: float | None = None, density_kg_m3: float | None = None,
 ) -> Record:  # fmt: skip
     """Read one recording, whatever its format."""
-    from bemt.data.recordings.cfd_run import is_run, of_rotor, run_at
-    from bemt.data.recordings.cfd_setup import one_grid, stated_setup
     from bemt.data.recordings.load import import_file
-    from bemt.data.recordings.reduce import reduce, reduction
     from bemt.data.recordings.stated import filled
 
     if imported is None:
@@ -91,9 +89,7 @@ def load(
     _speed_missing(imported, path)
     _airspeed_in_doubt(imported, case, path)
     _same_rotor(imported, case, path)
-    ducted = case.ducted
-    rho = float(case.air().rho)
-    findings = check(imported, diameter_m=case.diameter_m, ducted=ducted, density_kg_m3=rho)
+    findings = check(imported, diameter_m=case.diameter_m, ducted=case.ducted, density_kg_m3=float(case.air().rho))
     imported, findings = without_current(imported, findings)
     found = tuple(f"{Path(path).name}: {f}" for f in findings if f.severity != "note")
     imported = left_out(imported, findings)
@@ -151,8 +147,6 @@ def _airspeed_in_doubt(imported: Dataset, case: Case, path: str) -> None:
 
 def _step_responses(imported: Dataset, rows: Dataset, points: Dataset) -> bool:
     """Whether a short log of a turning rotor is for its transients, which its steady points leave out."""
-    from bemt.data.recordings.reduce import reduction
-
     found, rpm = reduction(points), rows.values.get("rpm", np.zeros(1))
     log = found.mode == "samples" and imported.format == "table" and len(imported) <= _SHORT
     return log and bool(np.all(rpm > 0.0)) and sum(map(len, found.rows)) < _STEADY * len(imported)
@@ -160,8 +154,6 @@ def _step_responses(imported: Dataset, rows: Dataset, points: Dataset) -> bool:
 
 def _scattered(series: Dataset, reduced: Dataset) -> Dataset:
     """Rows that state no uncertainty with that which the repeats of the reduction showed."""
-    from bemt.data.recordings.reduce import reduction
-
     u, floor = {k: np.array(v) for k, v in series.u.items()}, 1e-3
     for name, seen in reduced.u.items():
         if name not in ("thrust_N", "torque_Nm") or name not in series or np.isfinite(u[name]).any():
@@ -192,7 +184,7 @@ def _same_rotor(imported: Dataset, case: Case, path: str) -> None:
 
 def _unused(imported: Dataset, rows: Dataset, case: Case) -> list[str]:
     """Channels that the file has and that nothing here looks at, and loads that it has twice."""
-    known = {*_POINT, *_LOADS, "humidity"}
+    known = {*_POINT, *LOAD_CHANNELS, "humidity"}
     heard = {file_name(rows, k) for k in rows.values if k in known} | {k for k in imported.values if k in known}
     left = [k for k in imported.values if k not in heard and not k.startswith("u_") and "err" not in k]
     shown = ", ".join(left[:_NAMED]) + (f" and {len(left) - _NAMED} more" if len(left) > _NAMED else "")
@@ -209,7 +201,7 @@ def _unused(imported: Dataset, rows: Dataset, case: Case) -> list[str]:
 
 def _points(imported: Dataset, rows: Dataset, path: str) -> Dataset:
     """Rows as they are: coefficients by their own names, measured channels as a recording names them."""
-    values = {k: v for k, v in rows.values.items() if k in {*_POINT, *_LOADS}}
+    values = {k: v for k, v in rows.values.items() if k in {*_POINT, *LOAD_CHANNELS}}
     u = {k[2:]: v for k, v in imported.values.items() if k.startswith("u_")} | stated(rows)
     wet = {k: rows.values.get(k) for k in ("pressure_Pa", "temperature_K", "humidity")}
     if "density_kg_m3" not in values and all(v is not None and np.isfinite(v).all() for v in wet.values()):
@@ -231,7 +223,7 @@ def load_all(
     they have one of their own.
     """
     _told_twice([*recordings, *references], only, ruled_out)
-    found = _together(
+    found = at_once(
         lambda: cases_of(cases, off, len(recordings)), *(partial(_there, p) for p in (*recordings, *references))
     )[0]
     if before:
@@ -250,7 +242,7 @@ def load_all(
         raise InputError(Fault("--reference", "", f"{len(found)} cases", "one case for all, or theirs", hint))
     own, other = files[: len(recordings)], files[len(recordings) :]
     steps = [*_on_grids(own), *(s := _on_grids(other))]
-    read = _together(*(partial(_read, p, c, d, told) for p, c, told, d in steps))
+    read = at_once(*(partial(_read, p, c, d, told) for p, c, told, d in steps))
     known = [replace(r, reference=True) for r in read[len(read) - len(s) :]]
     return found, [*read[: len(read) - len(s)], *known]
 
@@ -260,8 +252,6 @@ _File = tuple[Any, "Case", dict[str, float | None]]
 
 def _on_grids(files: Sequence[_File]) -> list[tuple[Any, Case, dict[str, float | None], Dataset | None]]:
     """Files with what was read of each; CFD runs of one condition on several grids are one study, no repeats."""
-    from bemt.data.recordings.cfd_run import is_run, run_at
-    from bemt.data.recordings.grids import are_grids, together
     from bemt.data.recordings.load import import_file
 
     read: dict[int, Dataset] = {}
@@ -295,8 +285,8 @@ def _read(given: Any, case: Case, run: Dataset | None, told: Mapping[str, float 
     return records.from_series(given if isinstance(given, Dataset) else from_pandas(given), case)
 
 
-def _together(*steps: Callable[[], Any]) -> list[Any]:
-    """Results of some steps; the faults of all of them at once."""
+def at_once(*steps: Callable[[], Any]) -> list[Any]:
+    """Results of some steps, or the faults of all of them."""
     out: list[Any] = []
     faults: list[Fault] = []
     for step in steps:
@@ -352,7 +342,6 @@ def _unknown(only: Sequence[str], option: str = "--only") -> list[Fault]:
 
 def _one_setup(imported: Dataset, path: str) -> None:
     """Refuse a table of several propellers or motors: their points are no one curve."""
-    from bemt.base.tables import few
     from bemt.data.readers.generic_csv import setups
 
     for name, kinds in setups(imported.texts, imported.values).items():

@@ -5,26 +5,27 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from bemt.base.action import Answered
 from bemt.base.arrays import Array
+from bemt.base.errors import Fault, InputError
 from bemt.base.gaussian.evidence import log_sum
 from bemt.base.gaussian.whitening import whitener
 from bemt.base.tables import text_table
+from bemt.data.recordings.channels import named
 from bemt.judge.diagnose import form, knowledge, noise, posterior, problem, signatures
 from bemt.judge.diagnose import suggest as suggestion
 from bemt.judge.diagnose.assemble import assemble, build
-from bemt.judge.diagnose.record import Record
+from bemt.judge.diagnose.record import Record, from_series
 from bemt.judge.explanation import NONE, Explanation
 from bemt.judge.loss import COSTS
 from bemt.physics import effects
-
-if TYPE_CHECKING:
-    from bemt.physics.dataset import Dataset
-    from bemt.rotors.case import Case
+from bemt.physics.dataset import Dataset, from_pandas
+from bemt.physics.dataset.channels import channel_fault
+from bemt.rotors.case import Case
 
 SCHEMA = "bemt.plan/1"
 
@@ -108,48 +109,42 @@ class Plan(Answered):
 
     def _document(self) -> Mapping[str, object]:
         """Schema ``bemt.plan/1``."""
-        return document(self)
+        c = self.confusion
+        return {
+            "schema": SCHEMA, "points": self.points, "sight": self.sight,
+            "size": {i: float(s) for i, s in zip(c.ids, self.size, strict=True)},
+            "size_at_best": {i: float(s) for i, s in zip(c.ids, self.best, strict=True)},
+            "classes": c.classes(),
+            "distance": {i: {j: float(c.distance[a, b]) for b, j in enumerate(c.ids)} for a, i in enumerate(c.ids)},
+            "not_tried": self.absent,
+            "next_measurement": None if self.added is None else self.added.document(),
+            "notes": list(self.notes),
+        }  # fmt: skip
 
 
 def given(points: Any, case: Case) -> Record:
     """Points of a plan (path, Dataset, DataFrame or columns): a recording whose loads are not there yet."""
     from bemt.data.recordings.load import import_file
-    from bemt.physics.dataset import Dataset, from_pandas
 
-    if isinstance(points, (str, os.PathLike)):
-        return record_of(import_file(os.fspath(points)), case)
-    if isinstance(points, Dataset):
-        return record_of(points, case)
-    import pandas as pd
+    imported = import_file(os.fspath(points)) if isinstance(points, (str, os.PathLike)) else points
+    if not isinstance(imported, Dataset):
+        import pandas as pd
 
-    if not isinstance(points, (Mapping, pd.DataFrame)):
-        from bemt.base.errors import Fault, InputError
-
-        expected = "a path, a Dataset, a DataFrame or columns by name"
-        raise InputError(Fault("", "points", f"{type(points).__name__} {points!r:.40}", expected))
-    return record_of(from_pandas(pd.DataFrame(points), name="points"), case)
-
-
-def record_of(imported: Dataset, case: Case) -> Record:
-    """Points of a plan from a table of them."""
-    from bemt.base.errors import Fault, InputError
-    from bemt.data.recordings.channels import named
-    from bemt.judge.diagnose.record import from_series
-    from bemt.physics.dataset import Dataset
-    from bemt.physics.dataset.channels import channel_fault
-
-    path = imported.name
+        if not isinstance(points, (Mapping, pd.DataFrame)):
+            expected = "a path, a Dataset, a DataFrame or columns by name"
+            raise InputError(Fault("", "points", f"{type(points).__name__} {points!r:.40}", expected))
+        imported = from_pandas(pd.DataFrame(points), name="points")
     rows = named(imported)
     values = {k: v for k, v in imported.values.items() if imported.unit(k) or k in ("rpm", "J", "run")}
     values |= dict(rows.values)
     values = {k: v for k, v in values.items() if channel_fault(k) is None}  # rpm stands for the speed of each sensor
     if "rpm" not in values:
-        raise InputError(Fault(path, "", f"columns {', '.join(imported.values)}", "a column rpm"))
+        raise InputError(Fault(imported.name, "", f"columns {', '.join(imported.values)}", "a column rpm"))
     n = len(imported)
     loads = {k: values.get(k, np.ones(n)) for k in ("thrust_N", "torque_Nm")}
     lawful = {k: v for k, v in values.items() if not k.startswith("u_")}
     u = {k[2:]: np.abs(v) for k, v in values.items() if k.startswith("u_") and k[2:] in loads}
-    made = from_series(Dataset("bench", path, lawful | loads, u), case)
+    made = from_series(Dataset("bench", imported.name, lawful | loads, u), case)
     return replace(made, notes=(*made.notes, *imported.notes, *rows.notes))
 
 
@@ -203,18 +198,3 @@ def _sizes(
             apart = true(c.signatures - shown[:, i, None])
             least[k, i] += log_sum(-0.5 * np.sum(apart**2, axis=0), np.log(c.weight))
     return [np.asarray(row) for row in np.sqrt(2.0 * np.maximum(least, 0.0))]
-
-
-def document(answer: Plan) -> Mapping[str, object]:
-    """Give the document ``bemt.plan/1``."""
-    c = answer.confusion
-    return {
-        "schema": SCHEMA, "points": answer.points, "sight": answer.sight,
-        "size": {i: float(s) for i, s in zip(c.ids, answer.size, strict=True)},
-        "size_at_best": {i: float(s) for i, s in zip(c.ids, answer.best, strict=True)},
-        "classes": c.classes(),
-        "distance": {i: {j: float(c.distance[a, b]) for b, j in enumerate(c.ids)} for a, i in enumerate(c.ids)},
-        "not_tried": answer.absent,
-        "next_measurement": None if answer.added is None else answer.added.document(),
-        "notes": list(answer.notes),
-    }  # fmt: skip

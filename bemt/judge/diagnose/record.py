@@ -18,7 +18,7 @@ from bemt.data.recordings.channels import without_unit
 from bemt.judge.diagnose.repeats import conditions, fell, spread_sizes
 from bemt.physics.air import Air
 from bemt.physics.effects.base import follows
-from bemt.rotors.model import air_of_points
+from bemt.rotors.model import air_fields, air_of_points
 
 if TYPE_CHECKING:
     from bemt.data.recordings.findings import Finding
@@ -100,8 +100,8 @@ class Record:
 
         return replace(
             self, rpm=self.rpm[index], V=self.V[index],
-            air=air_of_points({k: getattr(self.air, k)[index] for k in _AIR}),
-            measured=cut(self.measured), u=cut(self.u), extra=cut(self.extra),
+            air=air_of_points(cut(air_fields(self.air))), measured=cut(self.measured), u=cut(self.u),
+            extra=cut(self.extra),
         )  # fmt: skip
 
     def only(self, channels: Sequence[str]) -> Record:
@@ -110,7 +110,7 @@ class Record:
         return replace(self, measured={c: self.measured[c] for c in kept}, u={c: self.u[c] for c in kept})
 
 
-_AIR, _STATE = ("rho", "mu", "a_sound", "temperature_K"), ("density_kg_m3", "pressure_Pa", "temperature_K")
+_STATE = ("density_kg_m3", "pressure_Pa", "temperature_K")
 NO_SPEED = "rpm: not recorded"
 """Start of the note of a recording that takes the speed of the case."""
 POWER_OPEN = "electrical power is left out: it needs a run of the same motor and controller, --reference RUN"
@@ -242,7 +242,7 @@ def _states(values: Mapping[str, Array], case: Case, notes: list[str], file: str
     n = len(values["rpm"])
     default = case.air()
     _plausible(values, file)
-    fields = {key: np.full(n, float(getattr(default, key))) for key in _AIR}
+    fields = {key: np.full(n, float(v[0])) for key, v in air_fields(default).items()}
     made = cache(lambda of, value, kelvin: of(value, kelvin - ZERO_CELSIUS))
     recorded = False
     for i in range(n):
@@ -257,8 +257,8 @@ def _states(values: Mapping[str, Array], case: Case, notes: list[str], file: str
         else:
             continue
         recorded = recorded or len(told) > ("temperature_K" in told)
-        for name in _AIR:
-            fields[name][i] = float(getattr(air, name))
+        for name, column in fields.items():
+            column[i] = float(getattr(air, name))
     if not recorded:
         notes.append(f"density: not recorded; {float(default.rho):.4g} kg/m3 of the case")
     return air_of_points(fields), recorded
@@ -319,7 +319,7 @@ def thinned(record: Record, most: int = MAX_POINTS) -> Record:
     # neighbours share slow errors: their mean is taken to be no better than one of them
     note = f"{P} points averaged to {rpm.size} of similar conditions"
     return replace(
-        record, rpm=rpm, V=mean(record.V), air=air_of_points({k: mean(getattr(record.air, k)) for k in _AIR}),
+        record, rpm=rpm, V=mean(record.V), air=air_of_points({k: mean(v) for k, v in air_fields(record.air).items()}),
         measured={k: mean(v / unit[k]) * rho * rpm**2 if k in unit else mean(v) for k, v in record.measured.items()},
         u={k: mean(v) for k, v in record.u.items()}, extra={k: mean(v) for k, v in record.extra.items()},
         notes=(*record.notes, note),
@@ -378,7 +378,7 @@ def merged(records: Sequence[Record]) -> Record:
     return thinned(replace(
         whole, name=", ".join(r.name for r in records), rpm=join([r.rpm for r in records]),
         V=join([r.V for r in records]), measured=measured, u=u, extra=concatenated(records),
-        air=air_of_points({k: join([getattr(r.air, k) for r in records]) for k in _AIR}),
+        air=air_of_points({k: join([getattr(r.air, k) for r in records]) for k in air_fields(whole.air)}),
         gain=_largest(r.gain for r in records), zero=_largest(r.zero for r in records),
         air_recorded=all(r.air_recorded for r in records), notes=_once(r.notes for r in records),
         findings=_once(r.findings for r in records), contradictions=_once(r.contradictions for r in records),
@@ -403,7 +403,6 @@ def _columns(records: Sequence[Record], of: str) -> dict[str, Array]:
 
 
 def _largest(told: Iterable[Mapping[str, float]]) -> dict[str, float]:
-    """Largest value of each channel."""
     out: dict[str, float] = {}
     for one in told:
         out |= {n: max(v, out.get(n, v)) for n, v in one.items()}
@@ -411,7 +410,6 @@ def _largest(told: Iterable[Mapping[str, float]]) -> dict[str, float]:
 
 
 def _once(told: Iterable[tuple[T, ...]]) -> tuple[T, ...]:
-    """Each of them once, in their order."""
     return tuple(dict.fromkeys(one for some in told for one in some))
 
 

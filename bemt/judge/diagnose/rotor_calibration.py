@@ -21,7 +21,6 @@ from bemt.base.given import path_text
 from bemt.base.tables import json_text, number_text, write_atomic
 from bemt.judge.diagnose.folder import beside, elsewhere, name_after
 from bemt.judge.diagnose.load import cases_of, load
-from bemt.physics.air import Air
 from bemt.physics.k1k2 import ZERO_THRUST_MEASURED
 from bemt.rotors.as_measured import AsMeasured, as_measured
 from bemt.rotors.case import Case
@@ -62,15 +61,8 @@ def calibrate(
     gains = [max(g) if g else SESSION for g in stated]
     if not any(np.isfinite(v).any() for v in y):
         raise InputError(Fault(paths[0], "", "neither thrust nor torque", "one of them, or coefficients"))
-    return case, learn(case, paths, y, u, rpm, V, air_of_points(air), (gains[0], gains[1]))
-
-
-def learn(
-    case: Case, paths: Sequence[str], y: Sequence[Any], u: Sequence[Any], rpm: Any, V: Any, air: Air,
-    gains: tuple[float, float],
-) -> AsMeasured:  # fmt: skip
-    """Condition the rotor of a case on thrust and torque coefficients ``y`` with uncertainties ``u``, two (P,) each."""
-    return as_measured(case, rpm, V, air, y[0], y[1], u[0], u[1], gains, where=", ".join(paths))
+    return case, as_measured(case, rpm, V, air_of_points(air), y[0], y[1], u[0], u[1],
+                            (gains[0], gains[1]), where=", ".join(paths))  # fmt: skip
 
 
 def write(

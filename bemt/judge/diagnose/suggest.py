@@ -79,13 +79,10 @@ class Given:
 
     def command(self, run: str = "", reference: str = "", ruled_out: str = "") -> str:
         """Command that diagnoses the same again, with one more file or one effect less."""
-        files = [*self.recordings, *([run] if run else [])]
-        known = [*self.references, *([reference] if reference else [])]
-        gone = [*self.ruled_out, *([ruled_out] if ruled_out else [])]
-        words = ["bemt diagnose", *files, *(["--reference", *known] if known else []), self.case]
-        changed = ["--changed", *self.changed] if self.changed else []
-        said = [*([self.rest] if self.rest else []), *options_of(self.stated), *changed]
-        return " ".join([*words, *said, *(["--ruled-out", *gone] if gone else [])])
+        said = {"--reference": (*self.references, reference), "": (self.case, self.rest, *options_of(self.stated)),
+                "--changed": self.changed, "--ruled-out": (*self.ruled_out, ruled_out)}  # fmt: skip
+        words = (word for option, own in said.items() if any(own) for word in (option, *own))
+        return " ".join(filter(None, ["bemt diagnose", *self.recordings, run, *words]))
 
     def comparison(self, reference: str) -> str:
         """Command that sets the first recording beside a reference."""

@@ -130,8 +130,7 @@ def conditions(plan: str, rig: Rig, rng: np.random.Generator) -> Conditions:
     if plan == "gap":
         span = (1.0 - rig.rotor.hub) * R
         n, g = grid(np.linspace(0.4, 1.0, 6) * top, np.array([0.006, 0.012, 0.02, 0.03, 0.045]) * span)
-        n2, g2 = n, g
-        return rows(np.concatenate((n, n2)), np.repeat([0.0, 0.5 * jmax], n.size), gap=np.concatenate((g, g2)),
+        return rows(np.tile(n, 2), np.repeat([0.0, 0.5 * jmax], n.size), gap=np.tile(g, 2),
                     run=np.repeat([0, 1], n.size), shuffle=True)  # fmt: skip
     if plan == "endurance":
         levels = np.tile(np.array([0.45, 0.7, 0.95, 0.6, 0.85]) * top, 12)

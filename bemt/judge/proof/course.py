@@ -141,7 +141,6 @@ def scored(entries: Sequence[Entry], courses: Sequence[Course], runs: int, fixed
 
 
 def _after(of_each: Sequence[tuple[Entry, Course]], k: int) -> After:
-    """What was found after so many runs."""
     judged = [judge(e, c, k) for e, c in of_each]
 
     def of(*sets: str, seen: bool = False) -> list[tuple[score.Judged, bool]]:

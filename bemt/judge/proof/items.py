@@ -68,9 +68,8 @@ class Bench:
         if cause.id == "ground_effect":
             without_world = replace(without_world, ground=0.0)
         real, base = self.measure(without_world, without_stand, ducted=cause.without.ducted is not False)
-        scales = (1.2 * float(np.nanmax(np.abs(real.thrust))), 1.2 * float(np.nanmax(np.abs(real.torque))))
         world, stand = applied(self.plain(), quiet, change)
-        _, with_it = self.measure(world, stand, scales=scales)
+        _, with_it = self.measure(world, stand, scales=full_scales(real))
         out = {name: with_it[name] - base[name] for name in base if name not in ("rpm", "airspeed_m_s", "time_s")}
         # a wrong speed or airspeed is seen through what the model says there
         if stand.rpm_scale or stand.airspeed_offset or stand.airspeed_gain:
@@ -333,10 +332,9 @@ def _judge(
 
 def recording_text(columns: Mapping[str, Iterable[float]]) -> str:
     """Recording as CSV."""
-    head = ["# concealed recording", ",".join(columns)]
     body = zip(*([f"{float(v):.{_DIGITS}g}" if n != "run" else str(int(v)) for v in column]
                  for n, column in columns.items()), strict=True)  # fmt: skip
-    return "\n".join([*head[1:], *(",".join(row) for row in body)]) + "\n"
+    return "\n".join([",".join(columns), *(",".join(row) for row in body)]) + "\n"
 
 
 def stations_text(r_R: ArrayLike, c_R: ArrayLike, beta_deg: ArrayLike) -> str:

@@ -20,7 +20,7 @@ import json
 import shlex
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from itertools import count, pairwise
 from pathlib import Path
@@ -215,7 +215,6 @@ def _at_the_stand(name: str) -> bool:
 
 
 def _step(item: _Item, step: Step) -> _Taken | str:
-    """Take one step."""
     kind, commands = step.kind, step.commands
     if kind not in ("run", "reference", "look") or not commands:
         return kind or "no run"
@@ -346,11 +345,8 @@ def loop(
     kept = out / "_".join(["loop", *(["fixed"] if fixed else []), *(["wired"] if hands else [])])
     kept.mkdir(exist_ok=True)
     benches = prove.benches_of(key)
-    todo = []
-    for entry in sorted(key.items, key=_rank):
-        answer = rows.stored(out / "answers" / f"{entry.folder}.json").answer
-        if entry.set in _SETS and answer:
-            todo.append((entry, answer))
+    told = ((e, rows.stored(out / "answers" / f"{e.folder}.json").answer) for e in sorted(key.items, key=_rank))
+    todo = [(entry, answer) for entry, answer in told if entry.set in _SETS and answer]
 
     def one(task: tuple[Entry, ToldAnswer]) -> Course:
         entry, answer = task
@@ -359,11 +355,8 @@ def loop(
             return Course.of(json.loads(file.read_text("utf-8")))
         bench = benches[entry.rig, entry.plan]
         mine = Bench(bench.rig, bench.plan, bench.rows)
-        if hands is None:
-            course = _course(out, entry, mine, answer, runs, fixed)
-        else:
-            with hands(out, entry) as hand:
-                course = _course(out, entry, mine, answer, runs, fixed, hand)
+        with nullcontext() if hands is None else hands(out, entry) as hand:
+            course = _course(out, entry, mine, answer, runs, fixed, hand)
         write_atomic(file, json.dumps(course.document()))
         return course
 

@@ -223,9 +223,7 @@ ASKED = "with_reference"
 TIME_LIMIT_S = 900.0
 
 
-def conceal(
-    out: Path, size: str, seed: int, say: Callable[[str], None] | None = None, jobs: int = 1
-) -> str:  # fmt: skip
+def conceal(out: Path, size: str, seed: int, say: Callable[[str], None] | None = None, jobs: int = 1) -> str:
     """Draw and write all items, and the sealed key."""
     from bemt.physics import effects
 

@@ -14,21 +14,23 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.given import data_roots, find_data
+from bemt.data.readers import uiuc
 from bemt.data.readers.uiuc_names import class_of
+from bemt.data.recordings.load import import_file
+from bemt.data.recordings.reduce import reduce
+from bemt.judge.compare.matched import stand_run
+from bemt.judge.compare.selection import selected
 from bemt.judge.proof.items import Cell, Item, case_text, recording_text, stations_text
 from bemt.judge.proof.rows import Entry
 from bemt.physics.sections import rule as section_rule
 from bemt.rotors.case.unknowns import section_of
-
-if TYPE_CHECKING:
-    from bemt.data.readers.uiuc import UiucPropeller
 
 _KEPT = ("rpm", "airspeed_m_s", "thrust_N", "torque_Nm", "density_kg_m3", "electrical_power_W", "voltage_V",
          "second_rotor_rad_s", "run")  # fmt: skip
@@ -155,8 +157,6 @@ def _plain(path: Path, how: _Recorded) -> dict[str, Array]:
 
 def _flight(path: Path, mass_kg: float) -> dict[str, Array]:
     """Thrust per propeller of a flight: mass times acceleration along the rotors, averaged over a tenth of a second."""
-    from bemt.data.recordings.load import import_file
-
     v = import_file(path)
     flying = (v.rpm > 0.5 * np.median(v.rpm)) & (v.height_m > 0.3)
     block = np.floor(v.time_s[flying] * 10.0).astype(int)
@@ -172,10 +172,6 @@ def _flight(path: Path, mass_kg: float) -> dict[str, Array]:
 
 def _read(path: Path, how: _Recorded) -> dict[str, Array]:
     """Steady points of one recording, in SI."""
-    from bemt.data.recordings.load import import_file
-    from bemt.judge.compare.matched import stand_run
-    from bemt.judge.compare.selection import selected
-
     if how.mass_kg is not None:
         columns = _flight(path, how.mass_kg)
     elif how.table or how.numbered:
@@ -298,7 +294,7 @@ def change_over_speed(rpm: Array, coefficient: Array) -> float:
 
 
 def _uiuc_case(
-    p: UiucPropeller, rpm: float, air: Mapping[str, Cell], off: Collection[str] = (), turned: float = 0.0
+    p: uiuc.UiucPropeller, rpm: float, air: Mapping[str, Cell], off: Collection[str] = (), turned: float = 0.0
 ) -> tuple[str, str]:
     g = p.geometry
     assert g is not None
@@ -312,7 +308,7 @@ def _uiuc_case(
             stations_text(g.r_R[keep], np.maximum(g.c_R[keep], 0.005), g.beta_deg[keep] + turned))  # fmt: skip
 
 
-def _dimensional(p: UiucPropeller) -> dict[str, Array]:
+def _dimensional(p: uiuc.UiucPropeller) -> dict[str, Array]:
     """All points of a propeller as a stand at `DENSITY` would have read them."""
     still = p.static
     parts = [] if still is None else [(still.rpm, np.zeros(still.rpm.size), still.CT, still.CP)]
@@ -330,8 +326,6 @@ def _dimensional(p: UiucPropeller) -> dict[str, Array]:
 
 
 def _uiuc(rng: np.random.Generator) -> Iterator[Item]:
-    from bemt.data.readers import uiuc
-
     root = find_data("uiuc")
     folders = [] if root is None else [f for f in (root / "volume-1", root / "volume-2") if f.is_dir()] or [root]
     propellers = [p for f in folders for p in uiuc.scan_folder(f).propellers if p.geometry is not None]
@@ -428,9 +422,6 @@ _FAN = {"blades": 8, "diameter_mm": 76, "hub_ratio": 0.25, "pitch_mm": 70, "chor
 
 
 def _fan() -> Iterator[Item]:
-    from bemt.data.recordings.load import import_file
-    from bemt.data.recordings.reduce import reduce
-
     root = find_data("jmajew")
     found = {}
     for name, pattern in (("ducted", "grp01__f1507_hqprop76x8_4s_duct_table*.csv"),

@@ -11,13 +11,13 @@ import numpy as np
 
 from bemt.base.page import Cell, render, table
 from bemt.base.tables import text_table
+from bemt.judge.loss import CLAIMS
 from bemt.judge.proof.causes import CAUSES
 from bemt.judge.proof.rows import Entry, Proof, Reliability, ScoreRow, Stratum, ToldAnswer, ToldLocation
 
 VISIBLE = 5.0
 """Separation in standard deviations from which on a cause counts as visible. [1]"""
 _CLEAR = 10.0
-_CLAIMS = ("named", "sensor", "class")
 _NOTHING = ("none", "unknown")
 
 
@@ -79,7 +79,7 @@ def judge(entry: Entry, answer: ToldAnswer) -> Judged:
     if not answer:
         return Judged(entry, answer, False, False, False, False)
     causes, verdict, said = entry.causes, answer.verdict, answer.effects
-    claims = verdict in _CLAIMS
+    claims = verdict in CLAIMS
     if not causes or entry.set == "unlisted":
         return Judged(entry, answer, claims, not claims, False, False)
     allowed, seen = entry.allowed, entry.seen
@@ -131,9 +131,7 @@ def _median(what: str, values: Sequence[float], target: str, limit: float) -> Sc
 def _blamed(j: Judged) -> bool:
     """Whether a fault of the stand was put down to the air."""
     said = set(j.answer.effects)
-    return j.claims and not said & set(j.entry.causes) and any(
-        i not in CAUSES or CAUSES[i].kind == "air" for i in said
-    )  # fmt: skip
+    return j.claims and not said & set(j.entry.causes) and any(i not in CAUSES or CAUSES[i].kind == "air" for i in said)
 
 
 def _beside(j: Judged) -> bool:
@@ -180,9 +178,7 @@ def _located(j: Judged) -> bool:
     return any(w == f or w.startswith(f"{f}_") or (len(f) > 2 and f in w) for w in words for f in families)
 
 
-def score(
-    judged: Sequence[Judged], settled: Sequence[bool] = (), again: Sequence[Judged] = ()
-) -> list[ScoreRow]:  # fmt: skip
+def score(judged: Sequence[Judged], settled: Sequence[bool] = (), again: Sequence[Judged] = ()) -> list[ScoreRow]:
     """The table of DIAGNOSIS 5; ``again`` are items that asked for a reference, with the answer that it led to."""
     p = _Pool(judged)
     return [*_claimed(p), *_of_sets(p), *_numbers(p, settled), *_with_reference([j for j in again if j.answer]),

@@ -22,14 +22,13 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, refuse
 from bemt.base.units import G0
-from bemt.judge.diagnose.rotor_calibration import learn
+from bemt.rotors.as_measured import AsMeasured, as_measured
 from bemt.rotors.model import air_fields, air_of_points
 from bemt.tools.flight.layout import layout_of
 from bemt.tools.flight.log import FlightLog
 from bemt.tools.flight.repeat import BATCHES, flight_scatter, half_width, jackknifed, regressed
 
 if TYPE_CHECKING:
-    from bemt.rotors.as_measured import AsMeasured
     from bemt.rotors.case import Case
 
 # Induced velocity of multirotors of 35 g to 3 kg in hover, 4 to 8 m/s [m/s]; c at that, and what both leave open [1]
@@ -239,4 +238,5 @@ def learn_from_flights(case: Case, files: Sequence[str], flights: Sequence[Ident
     u = CT * np.hypot(own, sd)
     unseen = np.full(CT.shape, np.nan)
     still = np.zeros(CT.shape)
-    return learn(case, files, [CT, unseen], [u, still], np.array(rpm), still, air_of_points(air), (AIR, AIR))
+    return as_measured(case, np.array(rpm), still, air_of_points(air), CT, unseen, u, still, (AIR, AIR),
+                       where=", ".join(files))  # fmt: skip
