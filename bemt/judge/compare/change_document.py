@@ -220,6 +220,7 @@ _PULSE = 0.01  # a command below is a pulse width [s], above a throttle [1]
 _MANY = 2
 # Probability from which a cause is said as a guess.
 _GUESS = 0.1
+_LEAST = 0.01  # probability that is told with two digits
 _NO_CAUSE = ("none", "unknown", "doubt")
 
 
@@ -417,8 +418,8 @@ def sentence(doc: ComparedRuns) -> str:
     if doc.verdict == "class":
         if len(doc.sets) > 1:  # more than one cause
             return f"{doc.rule}{sure}: {names}."
-        listed = ways(doc.effects, (Explanation.of(*r.effect.split("+")) for r in doc.ranking))
-        return f"One of these; the data cannot tell them apart{sure}: {', '.join(title_of(str(k)) for k in listed)}."
+        P = {Explanation.of(*r.effect.split("+")): r.probability for r in doc.ranking}
+        return one_of(doc.probability, {title_of(str(k)): P.get(k, 0.0) for k in ways(doc.effects, P)})
     if doc.verdict == "unknown":
         return f"Unknown: {doc.rule}."
     first = [title_of(k) for k in _likely(doc)]
@@ -427,6 +428,16 @@ def sentence(doc: ComparedRuns) -> str:
     if doc.rule.startswith(SPREAD):
         return f"No change is proven: {doc.rule}" + (f"; else {', '.join(first)}" if first else "") + "."
     return f"There is a change, but {doc.rule}" + (f". Likeliest: {', '.join(first)}" if first else "") + "."
+
+
+def one_of(total: float | None, each: Mapping[str, float]) -> str:
+    """What a class stands for, each way with its probability.
+
+    >>> one_of(0.97, {"gain": 0.9, "zero": 0.07, "duct": 0.001})
+    'One of these (0.97 in all): gain 0.90; zero 0.07; duct below 0.01.'
+    """
+    listed = "; ".join(f"{title} {p:.2f}" if p >= _LEAST else f"{title} below {_LEAST}" for title, p in each.items())
+    return f"One of these{'' if total is None else f' ({total:.2f} in all)'}: {listed}."
 
 
 def _tables(doc: ComparedRuns) -> list[str]:

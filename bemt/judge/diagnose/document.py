@@ -9,7 +9,7 @@ from typing import Any
 from bemt import __version__
 from bemt.base.tables import or_null, text_table
 from bemt.data.recordings.channels import AS_ELECTRICAL, AS_SHAFT
-from bemt.judge.compare.change_document import WORD, families
+from bemt.judge.compare.change_document import WORD, families, one_of
 from bemt.judge.compare.drive_laws import title_of
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import other_rotor
@@ -248,10 +248,11 @@ def _with_cause(d: Diagnosis) -> list[str]:
         signs = "; ".join(known[i].sign for i in said.effects if i in known and known[i].sign)
         words = [f"{named}: {told}." if told else f"{named}.", *([f"Signature: {signs}."] if signs else [])]
     elif said.verdict == "class":
-        lead, listed = "One of these", [_both(d, k) for k in _ways(d)]
-        if len(said.sets) > 1:  # more than one cause
-            lead, listed = f"{said.why[0].upper()}{said.why[1:]}", [_title(d, i) for i in said.effects]
-        words = [f"{lead} ({said.probability:.2f}): {', '.join(listed)}."]
+        if len(said.sets) < 2:
+            words = [one_of(said.probability, {_both(d, k): d.found.probability.get(k, 0.0) for k in _ways(d)})]
+        else:
+            listed = ", ".join(_title(d, i) for i in said.effects)
+            words = [f"{said.why[0].upper()}{said.why[1:]} ({said.probability:.2f}): {listed}."]
     elif said.verdict == "unknown":
         words = [f"The cause is not in the library: {said.why}. It shows in {d.found.states[0].best_rival}."]
     else:
@@ -344,10 +345,9 @@ def _of_class(d: Diagnosis) -> str:
         return f"{len(titles)} causes look alike in these readings: {families(said.effects)}"
     first, *others = _ways(d)
     lead = f"{_both(d, first, not first.pair)}, probability {d.found.probability.get(first, 0.0):.2f}"
-    between = ", or " if any(k.pair for k in others) else " or "
-    return (
-        f"The cause is {lead}, or {between.join(_both(d, k) for k in others)}; these readings cannot distinguish them"
-    )
+    if len(others) > 1:  # each with its own probability further down
+        return f"The cause is {lead}, or one of {len(others)} others that these readings cannot distinguish from it"
+    return f"The cause is {lead}, or {_both(d, *others)}; these readings cannot distinguish them"
 
 
 def _ways(d: Diagnosis) -> list[Explanation]:
