@@ -347,7 +347,7 @@ def _of_class(d: Diagnosis) -> str:
     lead = f"{_both(d, first, not first.pair)}, probability {d.found.probability.get(first, 0.0):.2f}"
     if len(others) > 1:  # each with its own probability further down
         return f"The cause is {lead}, or one of {len(others)} others that these readings cannot distinguish from it"
-    return f"The cause is {lead}, or {_both(d, *others)}; these readings cannot distinguish them"
+    return f"The cause is {lead}, or {_both(d, others[0])}; these readings cannot distinguish them"
 
 
 def _ways(d: Diagnosis) -> list[Explanation]:
