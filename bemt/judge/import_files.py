@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from bemt.base.action import Count, Told, action
+from bemt.base.errors import Fault, InputError
 
 if TYPE_CHECKING:
+    from bemt.data.readers.cfd_run import RunToml
+    from bemt.data.recordings.shown import Imported
     from bemt.rotors.propeller import Propeller
 
     File = str | os.PathLike[str]
@@ -106,77 +110,126 @@ def import_(
     >>> import_(file).to_dict()["schema"]
     'bemt.import/1'
     """
-    from bemt.base.canvas import kind_of
-    from bemt.base.errors import Fault, InputError
     from bemt.base.given import paths_text
     from bemt.data.recordings import cfd_options, load
     from bemt.data.recordings.adapt import asked
-    from bemt.data.recordings.stated import filled
+
+    _drawable(picture, case)
+    names = [f"{name}#{sheet}" if sheet else name for name in paths_text("files", files, 1)]
+    choice = asked(rpm, period_s, revolutions)
+    load.check_format(format)
+    run: dict[str, Any] = {"sector": sector, "zones": list(zones), "rotor_zones": list(rotor_zones), "axis": axis,
+                           "reference": words(reference), "setup": words(setup)}  # fmt: skip
+    columns = {"unit": words(unit), "column": words(column), "sign": words(sign)}
+    left = [os.fspath(heading) for heading in ([ignore] if isinstance(ignore, str) else ignore)]
+    air = {"airspeed_m_s": airspeed_m_s, "density_kg_m3": density_kg_m3}
+    measured = not any(run.values()) and all(map(load.is_measured, names))
+    stated = _Stated(names, measured, columns, left, run | ({} if measured else air), air, pole_pairs,
+                     None if out is None else os.fspath(out))  # fmt: skip
+    table, told = stated.tables(rpm)
+    taken = bool(table or told)  # then nothing that is stated is left to be applied
+    if pole_pairs and not taken:
+        raise InputError(Fault("", "--pole-pairs", f"{pole_pairs} with these files", "one table of measurements"))
+    names = [table] if table else names
+    if measured and not table:
+        told |= _in_air(names, air, lambda n: told.get(n) or load.import_file(n, format, choice))
+    speed = None if choice.period is None else 60.0 / choice.period
+    options: Any = {} if taken else {**stated.run, **columns, "ignore": left}
+    made = cfd_options.run_from(names, rpm=speed, revolutions=revolutions, **options)
+    rotor = None if case is None else _rotor(case)
+    found = load.import_files(names, format, choice, made, stated.insists and not taken, told, rotor)
+    wrote = _kept_run(made, found, stated.out) if found.runs and not table else ""
+    document, lines = found.document(), [f"{table} written\n"] if table and not found.runs else []
+    if case is not None:
+        seen, own = _seen(found, names, told, wrote, made)
+        flow = {} if own else {"rpm": rpm, **({} if measured else {"airspeed_m_s": airspeed_m_s})}
+        sentence, document["prediction"] = _beside(seen, case, picture, flow)
+        lines.append(f"{sentence}\n")
+    again = {"case": [str(case) if isinstance(case, str | os.PathLike) else "CASE"],
+             **({} if table else stated.again(rpm))}  # fmt: skip
+    text = "\n".join([*lines, found.text(wrote or (table if found.runs else ""), again)])
+    return Told(document, text, exit_code=found.exit_code, complaints=found.complaints)
+
+
+@dataclass(frozen=True)
+class _Stated:
+    """What the user states of files."""
+
+    names: list[str]
+    measured: bool  # Whether all are tables of measurements
+    columns: dict[str, list[str]]
+    left: list[str]
+    run: dict[str, Any]  # Of a CFD run, with its air
+    air: dict[str, float | None]
+    pole_pairs: int | None
+    out: str | None
+
+    @property
+    def insists(self) -> bool:
+        """Whether anything is stated that must be applied to something."""
+        return any((*self.columns.values(), *self.run.values(), self.left, self.out is not None, self.pole_pairs))
+
+    def tables(self, rpm: float | None) -> tuple[str, dict[str, Any]]:
+        """Tables of measurements as stated: one is kept, with the file that says so, others are read."""
+        from bemt.data.recordings import load
+        from bemt.data.recordings.stated import write_recording
+
+        facts: dict[str, Any] = {**self.columns, "pole_pairs": self.pole_pairs, "ignore": self.left}
+        if self.measured and self.out is not None and len(self.names) == 1:
+            return write_recording(self.names[0], self.out, rpm=rpm, **self.air, **facts).as_posix(), {}
+        if self.measured and self.out is None and self.insists:
+            return "", dict(zip(self.names, load.as_stated(self.names, facts), strict=True))
+        return "", {}
+
+    def again(self, rpm: float | None) -> dict[str, list[Any]]:
+        """Options of a next command."""
+        air = {name.replace("_", "-"): v for name, v in self.air.items()} | {"rpm": rpm if self.measured else None}
+        return {**self.columns, **{k: [v] for k, v in air.items() if v is not None}}
+
+
+def _drawable(picture: File | None, case: object) -> None:
+    """Refuse a picture without the case whose band it shows, or of no known kind."""
+    from bemt.base.canvas import kind_of
 
     if picture is not None and case is None:
         raise InputError(Fault("--picture", "", "no case", "--case CASE, whose band is drawn"))
     if picture is not None:
         kind_of(os.fspath(picture))
-    names = [f"{name}#{sheet}" if sheet else name for name in paths_text("files", files, 1)]
-    choice = asked(rpm, period_s, revolutions)
-    load.check_format(format)
-    columns = {"unit": words(unit), "column": words(column), "sign": words(sign)}
-    left = [os.fspath(heading) for heading in ([ignore] if isinstance(ignore, str) else ignore)]
-    air = {"airspeed_m_s": airspeed_m_s, "density_kg_m3": density_kg_m3}
-    run: dict[str, Any] = {"sector": sector, "zones": list(zones), "rotor_zones": list(rotor_zones), "axis": axis,
-                           "reference": words(reference), "setup": words(setup)}  # fmt: skip
-    measured = not any(run.values()) and all(map(load.is_measured, names))
-    run |= {} if measured else air
-    insist = any((*columns.values(), *run.values(), left, out is not None, pole_pairs))
-    facts = {**columns, "pole_pairs": pole_pairs, "ignore": left}
-    table, stated = _tables(names, out, insist, {"rpm": rpm, **air}, facts) if measured else ("", {})
-    taken = bool(table or stated)  # then nothing that is stated is left to be applied
-    if pole_pairs and not taken:
-        raise InputError(Fault("", "--pole-pairs", f"{pole_pairs} with these files", "one table of measurements"))
-    names = [table] if table else names
-    if measured and not table and any(v is not None for v in air.values()):
-        with suppress(InputError):  # said where it is read
-            read = {n: stated.get(n) or load.import_file(n, format, choice) for n in names}
-            stated |= {n: filled(one, **air) for n, one in read.items()}
-    speed = None if choice.period is None else 60.0 / choice.period
-    options = {} if taken else {**run, **columns, "ignore": left}
-    made = cfd_options.run_from(names, rpm=speed, revolutions=revolutions, **options)
-    rotor = None if case is None else _rotor(case)
-    found = load.import_files(names, format, choice, made, insist and not taken, stated, rotor)
-    wrote, document, lines = "", found.document(), []
-    if out is not None and not table and found.runs:
-        own = made.run.model_copy(update={"files": found.runs[-1].files})
-        made = made.model_copy(update={"run": own})
-        wrote = cfd_options.write_run(made, os.fspath(out)).as_posix()
-    if table and not found.runs:
-        lines.append(f"{table} written\n")
-    if case is not None:
-        runs: list[Any] = [] if wrote else load.runs_of(names, made)[0]  # as the options say, not as the files do
-        others = [f.path for f in found.files if f.record is None or f.record.kind != "cfd"] if runs else names
-        seen = [wrote] if wrote else [*runs, *(stated.get(name, name) for name in others)]
-        told = {} if wrote or runs else {"rpm": rpm, **({} if measured else {"airspeed_m_s": airspeed_m_s})}
-        sentence, document["prediction"] = _beside(seen, case, picture, told)
-        lines.append(f"{sentence}\n")
-    again: dict[str, list[Any]] = {"case": [str(case) if isinstance(case, str | os.PathLike) else "CASE"]}
-    if not table:
-        of_tables = {"airspeed-m-s": airspeed_m_s, "density-kg-m3": density_kg_m3, "rpm": rpm if measured else None}
-        again |= {**columns, **{k: [v] for k, v in of_tables.items() if v is not None}}
-    text = "\n".join([*lines, found.text(wrote or (table if found.runs else ""), again)])
-    return Told(document, text, exit_code=found.exit_code, complaints=found.complaints)
 
 
-def _tables(
-    names: Sequence[str], out: File | None, insist: bool, conditions: Mapping[str, Any], facts: Mapping[str, Any]
-) -> tuple[str, dict[str, Any]]:
-    """Tables of measurements as the user states them: one is kept, with the file that says so, others are read."""
-    from bemt.data.recordings import load
-    from bemt.data.recordings.stated import write_recording
+def _kept_run(made: RunToml, found: Imported, out: str | None) -> str:
+    """Write the run as stated, of the files that were read; its path, "" where none is asked for."""
+    from bemt.data.recordings.cfd_options import write_run
 
-    if out is not None and len(names) == 1:
-        return write_recording(names[0], os.fspath(out), **conditions, **facts).as_posix(), {}
-    if out is None and insist:
-        return "", dict(zip(names, load.as_stated(names, facts), strict=True))
-    return "", {}
+    if out is None:
+        return ""
+    own = made.run.model_copy(update={"files": found.runs[-1].files})
+    return write_run(made.model_copy(update={"run": own}), out).as_posix()
+
+
+def _seen(
+    found: Imported, names: Sequence[str], told: Mapping[str, Any], wrote: str, made: RunToml
+) -> tuple[list[Any], bool]:  # fmt: skip
+    """What is set beside a case, and whether it has its own conditions, as CFD runs do."""
+    from bemt.data.recordings.load import runs_of
+
+    if wrote:
+        return [wrote], True
+    runs: list[Any] = runs_of(names, made)[0]  # as the options say, not as the files do
+    others = [f.path for f in found.files if f.record is None or f.record.kind != "cfd"] if runs else names
+    return [*runs, *(told.get(name, name) for name in others)], bool(runs)
+
+
+def _in_air(
+    names: Sequence[str], air: Mapping[str, float | None], read: Callable[[str], Any]
+) -> dict[str, Any]:  # fmt: skip
+    """Recordings with the air that the user states; none where one cannot be read, which is said where it is."""
+    from bemt.data.recordings.stated import filled
+
+    if any(v is not None for v in air.values()):
+        with suppress(InputError):
+            return {n: filled(one, **air) for n, one in {n: read(n) for n in names}.items()}
+    return {}
 
 
 def words(given: Mapping[str, str] | Sequence[str]) -> list[str]:
