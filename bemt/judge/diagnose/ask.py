@@ -152,56 +152,60 @@ def diagnosed(
     only, channels = ([v] if isinstance(v, str) else list(v) for v in (only, channels))
     given, files = sorted_out(several(case), several(recordings))
     known = several(reference)
-    _both_there(given, files, known, reference_case, repeatability_pct)
-    if top_rpm is not None and not number("top_rpm", top_rpm) > 0.0:
-        raise InputError(Fault("--top-rpm", "", f"{top_rpm:g}", "a speed above 0 rev/min"))
+    _both_there(given, files, known, reference_case, repeatability_pct, top_rpm)
     target = None if out is None else path_text("out", out)
     theirs = None if reference_case is None else cases_of([reference_case], off, 1)[0]
-    speeds, winds, air = (
-        np.atleast_1d(np.asarray(v, dtype=float)).tolist() for v in (rpm, airspeed_m_s, density_kg_m3)
-    )
-    speed = {"rpm": speeds[0]} if len(speeds) == 1 and any(run.values()) else {}
-    stated = as_stated(files, {**run, **speed})
+    flow = {k: np.atleast_1d(np.asarray(v, dtype=float)).tolist()
+            for k, v in (("rpm", rpm), ("airspeed_m_s", airspeed_m_s), ("density_kg_m3", density_kg_m3))}  # fmt: skip
+    speeds = flow["rpm"]
+    stated = as_stated(files, {**run, **({"rpm": speeds[0]} if len(speeds) == 1 and any(run.values()) else {})})
     known_of = known if run["zones"] else as_stated(known, run)
     cases, records = load_all(stated, given, known_of, off, only, before=lambda found: folder.check(target, found),
-                              rpm=speeds, airspeed_m_s=winds, density_kg_m3=air,
-                              ruled_out=[*ruled_out, *changed], reference_case=theirs)  # fmt: skip
+                              ruled_out=[*ruled_out, *changed], reference_case=theirs, **flow)  # fmt: skip
     repeats = np.nan if repeatability_pct is None else repeatability_pct / 100.0
     records = [replace(r, repeatability=repeats, top_rpm=np.inf if top_rpm is None else top_rpm) for r in records]
     chosen = cases * len(stated) if len(cases) == 1 else cases
     each = cases if theirs is None else [*chosen, *[theirs] * len(known)]
+    rest = {
+        "off": off, "only": only, "channels": channels, "reference-case": _named(several(reference_case), "CASE"),
+        **{name.replace("_", "-"): v for name, v in flow.items()}, "repeatability-pct": several(repeatability_pct),
+        "zones": run["zones"], "top-rpm": several(top_rpm), "baseline": [baseline] * (baseline != "bemt"),
+    }  # fmt: skip
     own, others = (tuple(map(shlex.quote, _named(*f))) for f in ((files, "RECORDING"), (known, "REFERENCE")))
-    of_case, rest = (" ".join(options_of(words)) for words in ({"case": _named(given, "CASE")}, {
-        "off": off, "only": only, "channels": channels,
-        "reference-case": _named(several(reference_case), "CASE"), "rpm": speeds, "airspeed-m-s": winds,
-        "density-kg-m3": air, "repeatability-pct": several(repeatability_pct),
-        "zones": run["zones"], "top-rpm": several(top_rpm),
-        "baseline": [baseline] * (baseline != "bemt"),
-    }))  # fmt: skip
-    asked = Given(own, others, of_case, rest, tuple(ruled_out), tuple(changed), stated_options(run))
+    of_case, more = (" ".join(options_of(w)) for w in ({"case": _named(given, "CASE")}, rest))
+    asked = Given(own, others, of_case, more, tuple(ruled_out), tuple(changed), stated_options(run))
     heard = [CHANNELS[c] for c in channels] or None
-    one = [v[0] if len(v) == 1 else None for v in (speeds, winds)]
+    one = [flow[name][0] if len(flow[name]) == 1 else None for name in ("rpm", "airspeed_m_s")]
     blade = {} if along is None else along_blade(cases[0], Path(path_text("along", along)), records, *one)
-    beside = {"along_blade": {name: c.document() for name, c in blade.items()}} if blade else {}
     try:
         answer = diagnose(records, each, only or None, progress, baseline=baseline, given=asked, channels=heard)
     except InputError as error:
         if len(records) > 1 or any(f.where != "readings" for f in error.faults) or not isinstance(files[0], str):
             raise
-        # one point, or grids of one condition: shown beside the model
-        read = [import_file(f) if isinstance(f, str) and len(stated) > 1 else f for f in stated]
-        seen = read[0] if len(read) == 1 else together(read)
-        found = one_run.compare_run(seen, cases[0], progress, given[0] if isinstance(given[0], str) else "")
-        lead = f"Too few readings for a diagnosis ({error.faults[0].got}).\n{one_run.text(found)}"
-        told = {**found.document(), "verdict": "insufficient", "effects": [], **beside}
-        return OnePoint(told, "\n\n".join([lead, *(c.text() for c in blade.values())]))
+        many = len(stated) > 1
+        seen = [import_file(f) if isinstance(f, str) and many else f for f in stated]
+        label = given[0] if isinstance(given[0], str) else ""
+        beside = one_run.compare_run(together(seen) if many else seen[0], cases[0], progress, label)
+        return _too_few(error, beside, blade)
     names = [one if isinstance(one, str) else "recording" for one in files]
-    told = document(answer) | {"recordings": names, "cases": [c.name for c in cases]} | beside
+    told = document(answer) | {"recordings": names, "cases": [c.name for c in cases]} | _along(blade)
     if target is not None:
         made = [rotor_of(one).text for one in given] if len(given) == len(cases) else []  # a label has no file
         folder.write(target, answer, told, cases, figures, made)
     inside = "" if answer.said.verdict in CLAIMS else _inside(records, chosen)
     return Answer(answer, rotor_of(given[0] if len(given) == 1 and cases else cases[0]), told, blade, inside)
+
+
+def _along(blade: Mapping[str, AlongBlade]) -> dict[str, Any]:
+    """Loads along the blade as a part of a document, where there are any."""
+    return {"along_blade": {name: c.document() for name, c in blade.items()}} if blade else {}
+
+
+def _too_few(error: InputError, found: one_run.RunComparison, blade: Mapping[str, AlongBlade]) -> OnePoint:
+    """One point, or grids of one condition, beside the model."""
+    lead = f"Too few readings for a diagnosis ({error.faults[0].got}).\n{one_run.text(found)}"
+    told = {**found.document(), "verdict": "insufficient", "effects": [], **_along(blade)}
+    return OnePoint(told, "\n\n".join([lead, *(c.text() for c in blade.values())]))
 
 
 def _inside(records: Sequence[Record], cases: Sequence[Case]) -> str:
@@ -217,7 +221,9 @@ def _inside(records: Sequence[Record], cases: Sequence[Case]) -> str:
     return view.sentence.partition(";")[0].rstrip(".") + f"{hides}."
 
 
-def _both_there(cases: list[Any], files: list[Any], known: list[Any], theirs: Any, percent: float | None) -> None:
+def _both_there(
+    cases: list[Any], files: list[Any], known: list[Any], theirs: Any, percent: float | None, top_rpm: float | None
+) -> None:  # fmt: skip
     """Refuse a diagnosis without a recording or without a case."""
     faults = [] if files else [Fault("", "recordings", "none", "one or more tables or logs")]
     if theirs is not None and not known:
@@ -226,6 +232,8 @@ def _both_there(cases: list[Any], files: list[Any], known: list[Any], theirs: An
     if percent is not None and not 0.0 < percent <= REPEATABILITY_MAX:
         expected = f"a percentage above 0 and up to {REPEATABILITY_MAX:g}"
         faults.append(Fault("--repeatability-pct", "", f"{percent:g}", expected))
+    if top_rpm is not None and not number("top_rpm", top_rpm) > 0.0:
+        faults.append(Fault("--top-rpm", "", f"{top_rpm:g}", "a speed above 0 rev/min"))
     refuse(faults)
 
 
