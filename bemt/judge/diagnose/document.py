@@ -82,12 +82,14 @@ def document(d: Diagnosis) -> dict[str, Any]:
 
 
 def _located(d: Diagnosis, claimed: bool) -> list[str]:
-    """What the recording shows, and, where it is another thing, what calibration would leave of it.
+    """What the recording shows; without a cause also, where it is another thing, what calibration would leave of it.
 
     The location of the document is what remains in the light of the likeliest explanation. Its sign, and where none is
     given even its channel, may be those of something that the recording does not show.
     """
-    seen, rest = d.where if claimed else bare(d.found), d.where
+    if claimed:
+        return [d.where.sentence(d.words)]
+    seen, rest = bare(d.found), d.where
     lines = [seen.sentence(d.words)]
     if not seen.one_sided or (seen.channel, seen.size > 0) != (rest.channel, rest.size > 0):
         words = rest.rest(d.words)
@@ -254,7 +256,8 @@ def _with_cause(d: Diagnosis) -> list[str]:
             listed = ", ".join(_title(d, i) for i in said.effects)
             words = [f"{said.why[0].upper()}{said.why[1:]} ({said.probability:.2f}): {listed}."]
     elif said.verdict == "unknown":
-        words = [f"The cause is not in the library: {said.why}. It shows in {d.found.states[0].best_rival}."]
+        where, _, size = d.found.states[0].best_rival.partition(": ")
+        words = [f"The cause is not in the library: {said.why}. It shows in {where}, by about {size[:-1]} %."]
     else:
         words = [f"No name is given: {said.why}."]
     claimed = said.verdict not in ("unknown", "insufficient") or other_rotor.doubted(d.problem, said)
