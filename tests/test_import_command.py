@@ -204,6 +204,31 @@ def test_a_file_of_another_command_is_handed_over(tmp_path: Path) -> None:
     (tmp_path / "log.bbl").write_bytes(b"H Product:Blackbox flight data recorder by Nicholas Sherlock\n" + bytes(99))
     with pytest.raises(InputError, match="Betaflight .*bemt fly"):
         import_file(tmp_path / "log.bbl")
+    rows = "".join(f"{k},{1000 * k},{300 + k},{310 + k}\n" for k in range(40))
+    (tmp_path / "log.csv").write_text(
+        '"Firmware revision","Betaflight 4.4.2"\nloopIteration,time,motor[0],motor[1]\n' + rows
+    )
+    for read in (import_file, lambda file: bemt.diagnose(file, "10x5")):
+        with pytest.raises(InputError, match="Betaflight .*bemt fly"):
+            read(tmp_path / "log.csv")
+
+
+@pytest.mark.parametrize("heading", ["weight (g)", "Weight", "Gewicht [g]", "poids"])
+def test_what_a_kitchen_scale_is_called_is_asked_for(
+    heading: str, put: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Not taken, as a mass may be meant; not asked where a thrust is there, and no part's weight is one."""
+    rows = "".join(f"{n},{1.2e-5 * n * n:.5g},{1e-9 * n * n:.4g}\n" for n in range(3000, 9000, 500))
+    file = put("scale.csv", f"rpm,{heading},torque (N.m)\n{rows}")
+    asked = import_files([str(file)])
+    record = asked.files[0].record
+    assert record is not None and "thrust_N" not in named(record).values
+    assert f"--unit {shlex.quote(heading)}=UNIT" in asked.text()
+    _, found = call(capsys, file, "--unit", f"{heading}=gf")
+    assert "thrust_N" in found["files"][0]["channels"]
+    both = put("both.csv", f"rpm,{heading},thrust (N)\n{rows}")
+    part = put("part.csv", f"rpm,motor {heading},torque (N.m)\n{rows}")
+    assert "=UNIT" not in import_files([str(both)]).text() + import_files([str(part)]).text()
 
 
 def test_import_takes_the_speed_that_diagnose_takes(put: Callable[..., Path]) -> None:

@@ -353,7 +353,7 @@ def kind_of(path: str | os.PathLike[str]) -> str:
 
 def _refuse_known(target: Path, head: bytes, place: Collector, a_table: bool) -> None:
     """Refuse a file that only the reader of tables claims where it is something else, and any that none claims."""
-    for command, where in plugins.offered("FILE_KINDS").items() if not a_table else ():
+    for command, where in plugins.offered("FILE_KINDS").items():
         if kind := plugins.load(where)(target):
             place.refuse("", kind, "a recording of a stand", f"It is read by {command} {target}")
     if told := instead(head, a_table):

@@ -67,6 +67,7 @@ _ABROAD = {  # English: as others write it, without accents, in lower case; a bl
     "calettamento angolo~di~calettamento angolo~di~pala angulo~de~paso angulo~de~pala angulo~de~calado 桨叶角 安装角 "
     "kat~nastawienia угол~установки",
     "scale": "waage kuchenwaage balanza bilancia",
+    "weight": "gewicht poids peso вес 重量",
     "angle": "winkel angolo angulo kat угол hoek 角度",
     "pitch": "steigung pas passo paso",
     "static": "statisch statique estatico estatica statico statica 静态",

@@ -198,8 +198,14 @@ def meanings(text: str) -> list[str]:
 
     >>> meanings("Schub"), meanings("speed"), meanings("wibble")
     (['thrust'], ['rpm', 'airspeed'], [])
+
+    A weight alone is what a scale reads of a thrust, or the mass of a part: it is asked for, never taken.
+
+    >>> meanings("Gewicht [g]"), meanings("Motor weight (g)")
+    (['thrust'], [])
     """
-    known = quantities(english(re.split(r"[(\[]|\s(?:in|en|em)\s", text)[0]))
+    words = english(re.split(r"[(\[]|\s(?:in|en|em)\s", text)[0])
+    known = [("thrust", "force")] if words == ["weight"] else quantities(words)
     found = [name for name, dimension in known if dimension != "acceleration"]
     return ["power" if name == "mechanical power" else name.replace(" ", "_") for name in found]
 

@@ -50,7 +50,7 @@ def read_log(path: str | os.PathLike[str]) -> FlightLog:
 
 
 def kind_of(path: str | os.PathLike[str]) -> str:
-    """Format of a file that only this tool reads (ULog, DataFlash, Betaflight's own, packed or not); empty for others.
+    """Format of a file that only this tool reads (ULog, DataFlash, Betaflight, packed or not); empty for others.
 
     So that whoever meets such a file can hand it over.
     """
@@ -64,6 +64,8 @@ def kind_of(path: str | os.PathLike[str]) -> str:
             head = zlib.decompressobj(31).decompress(head, 4096)
     if head.startswith(_BETAFLIGHT):
         return "Betaflight blackbox"
+    if all(word in head for word in table.BETAFLIGHT):
+        return "Betaflight log as CSV"
     return next((r.KIND for r in (px4, ardupilot) if r.sniff(head)), "")
 
 

@@ -54,6 +54,8 @@ def _rotor(heading: str) -> int | None:
     return number[0] if "rpm" in said and len(number) == 1 and said <= _ROTOR_WORDS else None
 
 
+BETAFLIGHT = (b"loopIteration", b"motor[0]")
+"""Headings that every CSV of blackbox_decode and of Blackbox Explorer has."""
 _CLOCK = re.compile(r"\b(time|t|timestamp)(_(s|ms|us))?\b|loopIteration", re.IGNORECASE)
 _HEAD_BYTES = 1 << 18  # within which the headings stand
 _ROWS = 20_000  # of a piece
