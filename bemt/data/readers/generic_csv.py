@@ -40,7 +40,7 @@ from bemt.physics.dataset import Dataset
 
 KIND = "table"
 FALLBACK = True
-_MARKS = frozenset("0 1 2 3 4 5 6 7 8 9 g n kgf gf lbf kn nm mnm ncm cm mm kg lb oz gram grams gramm".split())
+_MARKS = frozenset("0 1 2 3 4 5 6 7 8 9 g n kgf gf lbf kn nm knm mnm ncm cm mm kg lb oz gram grams gramm".split())
 """Numbers of a sensor, and units, that a heading may have beside its words."""
 SETUP = re.compile(r"prop|motor|combination|setup|set-up|config|rotor|luftschraube|helice|h[ée]lice")
 """Headings of text that name what was on the stand."""
