@@ -17,7 +17,8 @@ from bemt.data.recordings.cfd_options import run_from, write_run
 from bemt.data.recordings.cfd_run import assemble, run_at
 from bemt.data.recordings.cfd_setup import CfdRun, grid_floor
 from bemt.data.recordings.channels import named
-from bemt.data.recordings.grids import are_grids, by_grid, together
+from bemt.data.recordings.grid_study import grid_study, ratios
+from bemt.data.recordings.grids import LoadStudy, are_grids, by_grid, together
 from bemt.data.recordings.load import as_dataset, import_file, import_files
 from bemt.judge.actions import compare
 from bemt.judge.diagnose.load import load_all
@@ -509,3 +510,22 @@ def test_grids_that_nobody_told_apart_are_asked_for_first(tmp_path: Path) -> Non
         assemble(run_from(histories(tmp_path), rpm=6000.0, unit=["thrust=N", "torque=N m"]))
     (fault,) = caught.value.faults
     assert "clock" not in fault.got and fault.hint.startswith("One condition on several grids: --setup cells=")
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ((9.99, 9.96, 9.84), ("; order 2.00, ", "GCI 0.13 %, u")),
+        ((9.999, 9.968, 8.976), ("; order 5.00, ", "GCI 0.01 % not used, u 17.8 %")),
+        ((10.0, 9.9), ("; assumed order 2, ", "GCI 1.00 %, u")),
+    ],
+    ids=["observed", "implausible", "assumed"],
+)
+def test_a_sentence_tells_an_observed_order_from_an_assumed_one_and_an_index_that_is_not_used(
+    values: tuple[float, ...], words: tuple[str, ...]
+) -> None:
+    cells = (8e6, 1e6, 125e3)[: len(values)]
+    s = grid_study(values, ratios(cells))
+    told = s.u_relative, s.order, s.extrapolated, s.gci_fine, s.gci_coarse, s.asymptotic, s.flags
+    said = LoadStudy("thrust_N", cells, s.values, *told, rpm=6000.0).sentence()
+    assert all(word in said for word in words), said

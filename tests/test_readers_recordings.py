@@ -948,7 +948,7 @@ def test_a_point_at_which_the_vendors_code_failed_is_a_flagged_row(write: Write)
         ("Thrust - gf", "thrust_N", "N"), ("Torque - N*m", "torque_Nm", "Nm"), ("Thrust, N", "thrust_N", "N"),
         ("Thrust in N", "thrust_N", "N"), ("thrust kgf", "thrust_N", "N"), ("Thrust / N", "thrust_N", "N"),
         ("I/A", "I_A", "A"), ("U/V", "voltage_V", "V"), ("T/K", "T_K", "K"), ("P/W", "P_W", "W"),
-        ("Torque (N.m)", "torque_Nm", "Nm"),
+        ("Torque (N.m)", "torque_Nm", "Nm"), ("Torque [kNm]", "torque_Nm", "Nm"), ("Torque (kN·m)", "torque_Nm", "Nm"),
         ("Thrust (Newtons)", "thrust_N", "N"), ("Torque (N-mm)", "torque_Nm", "Nm"), ("Temp (ºC)", "temp_K", "K"),
         ("Omega [rad s^-1]", "omega_rad_s", "rad_s"), ("ESC signal (Âµs)", "pulse_width_s", "s"),
         ("ESC throttle (μs)", "pulse_width_s", "s"), ("Throttle (us)", "pulse_width_s", "s"),

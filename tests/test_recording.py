@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import random
+import shlex
 from collections.abc import Callable
+from contextlib import chdir
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import bemt
+from bemt.app.cli import main
 from bemt.base import units
 from bemt.base.errors import InputError
 from bemt.data import readers as importers
@@ -115,6 +118,22 @@ thrust = { column = 2, unit = "N" }
 """
     got = importers.read(put(toml, table))
     assert np.allclose(got["thrust_N"], np.arange(5) + 0.25) and len(got) == 5
+
+
+def test_a_table_without_headings_prints_the_command_that_names_its_columns(tmp_path: Path) -> None:
+    """What the message says to type writes a recording.toml, and that is read."""
+    text = "6000;12.1;0.21\n7000;16.3;0.28\n8000;21.4;0.37\n9000;27.2;0.47\n"
+    (tmp_path / "bare.csv").write_text(text)
+    with chdir(tmp_path):
+        notes = importers.read("bare.csv").notes
+        step = next(n for n in notes if "bemt import" in n).partition("bemt import")[2]
+        words = [w for word in shlex.split(step) for w in ([word, "torque=3"] if word == "--column" else [word])]
+        assert (
+            main(["import", *[w for word in words for w in ([word, "torque=Nm"] if word == "--unit" else [word])]]) == 0
+        )
+        got = importers.read("recording.toml")
+    assert np.allclose(got["rpm"], [6000, 7000, 8000, 9000]) and np.allclose(got["thrust_N"], [12.1, 16.3, 21.4, 27.2])
+    assert np.allclose(got["torque_Nm"], [0.21, 0.28, 0.37, 0.47])
 
 
 def test_runs_are_joined_in_their_order(put: Put, tmp_path: Path) -> None:

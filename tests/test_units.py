@@ -17,6 +17,7 @@ from bemt.base.errors import InputError
         ("ozf", 2.780139e-1, 1e-6), ("lbf_in", 1.129848e-1, 1e-6), ("lbf_ft", 1.355818, 1e-6),
         ("ozf_in", 7.061552e-3, 1e-6), ("hp", 7.456999e2, 1e-6), ("kt", 5.144444e-1, 1e-6), ("mph", 4.4704e-1, 1e-12),
         ("km_h", 2.777778e-1, 1e-6), ("rpm", 1.047198e-1, 1e-6), ("deg", 1.745329e-2, 1e-6), ("bar", 1e5, 0),
+        ("kNm", 1e3, 0),
     ],
 )  # fmt: skip
 def test_factors_are_the_published_ones(unit, si, rel):

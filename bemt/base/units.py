@@ -72,8 +72,8 @@ def _table() -> dict[str, Unit]:
         "density": {"kg_m3": 1.0, "g_cm3": 1e3},
         "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3, "kgf": KGF, "gf": KGF * 1e-3, "lbf": LBF, "ozf": OZF},
         "torque": {
-            "Nm": 1.0, "mNm": 1e-3, "Ncm": 1e-2, "Nmm": 1e-3, "kgf_m": KGF, "kgf_cm": KGF * 1e-2, "gf_cm": KGF * 1e-5,
-            "lbf_in": LBF * INCH, "lbf_ft": LBF * FOOT, "ozf_in": OZF * INCH,
+            "Nm": 1.0, "mNm": 1e-3, "Ncm": 1e-2, "Nmm": 1e-3, "kNm": 1e3, "kgf_m": KGF, "kgf_cm": KGF * 1e-2,
+            "gf_cm": KGF * 1e-5, "lbf_in": LBF * INCH, "lbf_ft": LBF * FOOT, "ozf_in": OZF * INCH,
         },
         "power": {"W": 1.0, "kW": 1e3, "hp": HP},
         "pressure": {

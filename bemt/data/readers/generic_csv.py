@@ -22,6 +22,7 @@ from bemt.data.readers import head_text, load_text, number
 from bemt.data.readers._large import NumberTable, large_table
 from bemt.data.readers._words import NEUTRAL, english
 from bemt.data.readers.headings import USUAL, Heading, counts_electrical, heading, may_be, slug
+from bemt.data.readers.left_open import one_step
 from bemt.data.readers.recording import Builder, plausible
 from bemt.data.readers.samples import Channel
 from bemt.data.readers.split import (
@@ -39,7 +40,7 @@ from bemt.physics.dataset import Dataset
 
 KIND = "table"
 FALLBACK = True
-_MARKS = frozenset("0 1 2 3 4 5 6 7 8 9 g n kgf gf lbf kn nm mnm ncm cm mm kg lb oz gram grams gramm".split())
+_MARKS = frozenset("0 1 2 3 4 5 6 7 8 9 g n kgf gf lbf kn nm knm mnm ncm cm mm kg lb oz gram grams gramm".split())
 """Numbers of a sensor, and units, that a heading may have beside its words."""
 SETUP = re.compile(r"prop|motor|combination|setup|set-up|config|rotor|luftschraube|helice|h[ée]lice")
 """Headings of text that name what was on the stand."""
@@ -119,7 +120,9 @@ def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
         build.add(k, head)
     _air_above(build)
     if not table.headings:
-        build.warnings.append("no heading line: columns are numbered; a recording.toml with header = false names them")
+        options = ("--column rpm=1 thrust=2", "--unit rpm=rpm thrust=N")
+        step = one_step(Path(build.table.source.name).as_posix(), options)
+        build.warnings.append(f"no heading line: columns are numbered. With your own numbers and units: {step}")
     build.flag_time()
     speeds = [n for n in build.channels if n == "rpm" or n.endswith("_rpm")]
     build.flag_speeds(*speeds)

@@ -23,7 +23,7 @@ from bemt.base.tables import number_text
 from bemt.data.readers.headings import CELLS
 from bemt.data.recordings.cfd_setup import CONDITIONS, CfdRun, conditions_of, stated_of, with_grid_floor
 from bemt.data.recordings.channels import named
-from bemt.data.recordings.grid_study import grid_study, ratios
+from bemt.data.recordings.grid_study import COVERAGE, grid_study, ratios
 from bemt.physics.dataset import Dataset, concat
 from bemt.physics.dataset.channels import channel_fault
 
@@ -98,7 +98,9 @@ class LoadStudy(Documented):
         if self.order is None or self.gci_fine is None:
             return f"{lead}; no order: three times their spread is taken, {end}"
         best = f"{number_text(self.extrapolated, 4)} {unit}".rstrip()
-        return f"{lead}; order {self.order:.2f}, {best} at cell size 0, GCI {100 * self.gci_fine:.2f} %, {end}"
+        order = f"order {self.order:.2f}" if len(self.values) > 2 else f"assumed order {self.order:g}"
+        used = "" if self.u_relative * COVERAGE <= self.gci_fine * (1.0 + 1e-9) else " not used"
+        return f"{lead}; {order}, {best} at cell size 0, GCI {100 * self.gci_fine:.2f} %{used}, {end}"
 
 
 def groups(d: Dataset) -> list[list[int]]:

@@ -154,19 +154,24 @@ def recording_from(
 ) -> dict[str, Any]:  # fmt: skip
     """Tables of a recording.toml from what options say of a table of measurements; their faults come after `faults`.
 
-    `unit` ``NAME=UNIT``, of a quantity or a heading; `column` ``QUANTITY=HEADING``; `sign` ``QUANTITY=-1``;
-    `pole_pairs` of a speed that counts electrical revolutions; headings to `ignore`; what no column has.
+    `unit` ``NAME=UNIT``, of a quantity or a heading; `column` ``QUANTITY=HEADING``, of a table without headings
+    ``QUANTITY=NUMBER``; `sign` ``QUANTITY=-1``; `pole_pairs` of a speed that counts electrical revolutions; headings to
+    `ignore`; what no column has.
     """
     faults, table = list(faults), split_table(load_text(file))
     faults += [Fault("", "--ignore", repr(h), f"one of {some(map(repr, table.headings), 12)}")
                for h in ignore if h not in table.headings]  # fmt: skip
     read_as = {q: h for q, h in _read_as(file).items() if h not in ignore}
-    headings = _Measured([h for h in table.headings if h and h not in ignore], {}, read_as)
+    bare = [] if table.headings else [str(k + 1) for k in range(table.width)]  # columns by their number
+    headings = _Measured(bare or [h for h in table.headings if h and h not in ignore], {}, read_as)
     loads = [q for q in ("thrust", "torque") if q in headings.read_as]
     if loads and list(sign) in (["-1"], ["1"]):  # turns all
         sign = [f"{q}={text}" for q in loads for text in sign]
     columns = _facts(headings, unit, column, sign, pole_pairs, faults, plain=True)
-    head: dict[str, Any] = {"file": Path(file).name} | ({"decimal": ","} if decimal_mark(table) == "," else {})
+    for facts in columns.values() if bare else ():
+        facts["column"] = int(facts["column"])
+    head: dict[str, Any] = {"file": Path(file).name} | ({"header": False} if bare else {})
+    head |= {"decimal": ","} if decimal_mark(table) == "," else {}
     head |= {"ignore": list(ignore)} if ignore else {}
     head |= {k: v for k, v in (("rpm", rpm), ("airspeed_m_s", airspeed_m_s)) if v is not None}
     out = Collector(file)
