@@ -14,7 +14,7 @@ from bemt.judge.compare.change_document import WORD
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose.record import CHANNELS
 from bemt.judge.explanation import UNKNOWN, Explanation, Sizes
-from bemt.judge.loss import Decision
+from bemt.judge.loss import CLAIMS, Decision
 from bemt.physics import effects
 
 if TYPE_CHECKING:
@@ -34,14 +34,15 @@ _ORDER = ("J", "M_tip", "Re", "rpm", "wall_distance_m", "tip_gap_m", "sideslip_r
           "density_kg_m3", "voltage_V", "current_A", "pwm_s", "run")  # fmt: skip
 CHANNEL_WORDS = {"thrust_N": "thrust", "torque_Nm": "torque", "rpm": "speed of rotation"}
 POWER = "electrical_power_W"
-# Words, unit and digits.
-_VARIABLE = {
+VARIABLES = {
     "J": ("advance ratio", "", 2), "M_tip": ("tip Mach number", "", 2), "Re": ("Reynolds number", "", 0),
     "rpm": ("speed of rotation", " rev/min", 0), "time_s": ("time", " s", 0), "temperature_K": ("temperature", " K", 1),
-    "wall_distance_m": ("wall distance", " m", 3), "tip_gap_m": ("tip gap", " m", 5), "voltage_V": ("voltage", " V", 2),
-    "current_A": ("current", " A", 1), "sideslip_rad": ("sideslip", " rad", 2),
-    "density_kg_m3": ("density", " kg/m3", 3), "pwm_s": ("pulse width", " s", 6), "run": ("run", "", 0),
+    "wall_distance_m": ("wall distance", " m", 3), "tip_gap_m": ("tip gap", " m", 5),
+    "sideslip_rad": ("sideslip", " rad", 2), "density_kg_m3": ("density", " kg/m3", 3),
+    "voltage_V": ("voltage", " V", 2), "current_A": ("current", " A", 1), "pwm_s": ("pulse width", " s", 6),
+    "pressure_Pa": ("pressure", " Pa", 0), "run": ("run", "", 0),
 }  # fmt: skip
+"""Words, unit and digits."""
 _PERCENT = (0.5, 2.0)  # ratios between these are said in percent
 
 
@@ -125,14 +126,14 @@ class Location:
                 ends = {True: "up to ", False: "down to "}[s.size > 0.0] if s.wide else ""
                 told = f"{ends}{share(s.size)} of what the case gives"
             by_place.setdefault(self._place(s), []).append(told)
-        name = _VARIABLE.get(self.variable, (self.variable, "", 3))[0]
+        name = VARIABLES.get(self.variable, (self.variable, "", 3))[0]
         each = [f"{' and '.join(told)}, at {'' if k else f'{name} '}{place}"
                 for k, (place, told) in enumerate(by_place.items())]  # fmt: skip
         return f"{words[self.channel].capitalize()} is {', '.join(each[:-1])}{', and ' * (len(each) > 1)}{each[-1]}."
 
     def _place(self, s: Stretch) -> str:
         """Where a stretch is."""
-        _, unit, digits = _VARIABLE.get(self.variable, (self.variable, "", 3))
+        _, unit, digits = VARIABLES.get(self.variable, (self.variable, "", 3))
         ends = " to ".join(dict.fromkeys(f"{x:.{digits}f}" for x in (s.low, s.high))) + unit
         if self.variable in ("M_tip", "Re"):
             ends += f" ({' to '.join(dict.fromkeys(f'{n:.0f}' for n in s.rpm))} rev/min)"
@@ -369,7 +370,7 @@ class Diagnosis:
     def systems(self) -> dict[str, Mapping[str, object]]:
         """Verdict and effects of air, stand and drive, each for itself."""
         said = self.said
-        listed = said.verdict in ("named", "class", "sensor")
+        listed = said.verdict in CLAIMS
         known = effects.catalogue()
         kinds = {i: known[i].kind if i in known else "drive" for i in said.effects}  # a law of the drive is no effect
         out: dict[str, Mapping[str, object]] = {}

@@ -302,9 +302,7 @@ def partitions(problem: Problem, most: int = 6) -> list[tuple[str, NDArray[np.in
 
     if len(problem.parts) > 1 and 3 <= np.unique(run).size <= most:
         out.append(("recordings", whole(np.unique(run, return_inverse=True)[1])))
-    for name in ("rpm", "J"):
-        x = np.log(X[name]) if name == "rpm" else X[name]
-        gap = 0.03 if name == "rpm" else 0.02
+    for name, x, gap in (("rpm", np.log(X["rpm"]), 0.03), ("J", X["J"], 0.02)):
         order = np.argsort(x, kind="stable")
         line = np.empty(count, dtype=np.intp)
         line[order] = np.cumsum(np.r_[0, np.diff(x[order]) > gap])

@@ -18,9 +18,10 @@ from bemt.base.page import FIRST
 from bemt.base.tables import write_atomic
 from bemt.judge.compare.first_picture import LABEL, PredictionView, against_band
 from bemt.judge.diagnose import figures_effects
-from bemt.judge.diagnose.answer import CHANNEL_WORDS, Diagnosis
+from bemt.judge.diagnose.answer import CHANNEL_WORDS, VARIABLES, Diagnosis
 from bemt.judge.diagnose.document import headline
 from bemt.judge.diagnose.record import CHANNELS, Record
+from bemt.judge.loss import CLAIMS
 from bemt.physics.dataset import Dataset
 
 if TYPE_CHECKING:
@@ -37,18 +38,12 @@ LARGEST = 120_000
 """Largest file that is written [B]; a larger one loses colours."""
 
 _COEFFICIENT = {"thrust_N": LABEL["CT"], "torque_Nm": LABEL["CP"], "rpm": "rpm [rev/min]"}
-_AXIS = {
-    "J": "advance ratio J [1]", "M_tip": "tip Mach number [1]", "Re": "Reynolds number at 0.75 R [1]",
-    "rpm": "speed of rotation [rev/min]", "time_s": "time [s]", "temperature_K": "temperature [K]",
-    "wall_distance_m": "wall distance [m]", "tip_gap_m": "tip gap [m]", "sideslip_rad": "sideslip [rad]",
-    "density_kg_m3": "density [kg/m³]", "voltage_V": "voltage [V]", "current_A": "current [A]",
-    "pwm_s": "pulse width [s]", "pressure_Pa": "pressure [Pa]", "run": "run",
+_AXIS = {name: f"{words} [{unit.strip() or '1'}]" for name, (words, unit, _) in VARIABLES.items()} | {
+    "J": "advance ratio J [1]", "Re": "Reynolds number at 0.75 R [1]", "density_kg_m3": "density [kg/m³]", "run": "run"
 }  # fmt: skip
 _CONDITIONS = ("J", "rpm", "M_tip", "Re", "density_kg_m3")
 # Most panels, fewest points of a curve, and how far advance ratios of one line are apart.
 _MOST_LINES, _LONG, _ONE_J = 4, 3, 0.02
-_SAID = ("named", "class", "sensor")
-"""Verdicts that name something, so that the fit counts as an improvement."""
 _BOLD = 3.0  # width of a line in the located region
 _SHADES = (BLUE, RED, GREEN, PURPLE, ORANGE, SKY, BLACK)
 
@@ -336,7 +331,7 @@ def _before_after(answer: Diagnosis) -> Figure:
     unit, factor = _coefficients(answer), answer.found.states[0].hyper.scale
     what = " and ".join([" + ".join(answer.best.ids), "calibration"]).removeprefix(" and ")
     everywhere = np.ones_like(problem.free)
-    fitted = "improved" if answer.decision.verdict in _SAID else "best fit, not confirmed"
+    fitted = "improved" if answer.decision.verdict in CLAIMS else "best fit, not confirmed"
     models = (
         ("baseline", problem.f0, RED, "--", everywhere),
         (f"{fitted} ({what})", answer.after, BLUE, "-", everywhere),

@@ -65,8 +65,6 @@ class Bench:
         """Readings with a cause less those without it, noise apart."""
         quiet = StandErrors()
         without_world, without_stand = applied(self.plain(), quiet, cause.without)
-        if cause.id == "ground_effect":
-            without_world = replace(without_world, ground=0.0)
         real, base = self.measure(without_world, without_stand, ducted=cause.without.ducted is not False)
         world, stand = applied(self.plain(), quiet, change)
         _, with_it = self.measure(world, stand, scales=full_scales(real))
@@ -298,9 +296,7 @@ def _reference(bench: Bench, h: Hidden, air_known: bool) -> str:
     world, stand, ducted = h.own_world, h.own_stand, True
     for cause, change in sorted(zip(h.causes, h.changes, strict=True), key=lambda pair: pair[0].removable):
         world, stand = applied(world, stand, cause.without if cause.removable else change)
-        if cause.removable:
-            world = replace(world, ground=0.0) if cause.id == "ground_effect" else world
-            ducted = ducted and cause.without.ducted is not False
+        ducted = ducted and not (cause.removable and cause.without.ducted is False)
     real, columns = bench.measure(world, stand, h.more, ducted=ducted)
     good = np.isfinite(columns["thrust_N"]) & np.isfinite(columns["torque_Nm"])
     shown = _shown(bench, real, columns, stand, air_known, h.more, h.stated)

@@ -63,7 +63,6 @@ class Truth:
         for cause in taken:
             ducted = ducted and cause.without.ducted is not False
             world, stand = applied(world, stand, cause.without)
-            world = replace(world, ground=0.0) if cause.id == "ground_effect" else world
         rotor = self.bench.rig.rotor if ducted else replace(self.bench.rig.rotor, wall=float("nan"))
         duct = self.bench.rig.duct if ducted else None
         real = loads(rotor, world, plan, duct, None)

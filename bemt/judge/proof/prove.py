@@ -30,7 +30,6 @@ from bemt.judge.proof.rows import Entry, Key, Miss, Proof, ScoreRow, ToldAnswer
 from bemt.judge.proof.stand import StandErrors, yardstick
 
 _STRENGTHS = (0.5, 1.0, 1.7)
-_PHYSICAL = ("reynolds", "compressibility", "drag_divergence", "stall_delay", "duct", "tip_gap", "ground_effect")
 _GRIDS = ("grid_shuffled", "grid_ordered", "two_air")
 
 
@@ -100,7 +99,7 @@ def _pick(
 def _strength(name: str, k: int, rng: np.random.Generator) -> float:
     """Three strengths, each a little off; what is real everywhere cannot be much stronger or weaker."""
     f = _STRENGTHS[k % 3] * float(rng.uniform(0.85, 1.15))
-    return float(f**0.35) if name in _PHYSICAL else f
+    return float(f**0.35) if CAUSES[name].without != causes.Change() else f
 
 
 @dataclass(frozen=True)
