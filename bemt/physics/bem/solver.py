@@ -191,7 +191,8 @@ def prepare(
     if not polars:
         raise ValueError("polars: got none; expected at least one (r/R, Polar) pair")
     eff = standard() if effects is None else tuple(effects)
-    if not any(e.id == "reynolds" for e in eff):
+    by_Re = any(e.id == "reynolds" for e in eff)
+    if not by_Re:
         polars = [(x, arrays.at_fixed_re(p)) for x, p in polars]
     for e in (e for e in eff if type(e).duct is not Effect.duct):
         duct = _enclosed(duct, e.duct(rotor.R, duct is not None))
@@ -215,7 +216,7 @@ def prepare(
     cone = None if math.isnan(bake.num.cone) else bake.num.cone
     at_75 = arrays.blend_weights(np.array([0.75]), np.array([x for x, _ in polars]))[0] > 0.0
     least = [float(p.Re[0]) for (_, p), used in zip(polars, at_75, strict=True) if used and p.Re.size > 1]
-    bottom = max(least, default=0.0) if bake.Re.size > 1 else 0.0
+    bottom = max(least, default=0.0) if by_Re else 0.0
     return Prepared(rotor, s, eff, duct, st, tab, (bake.M2.size, bake.Re.size), num, grid, cone, bottom)
 
 
