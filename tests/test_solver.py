@@ -22,6 +22,7 @@ from bemt.physics.effects.lifting_surface import LiftingSurface
 from bemt.physics.effects.swirl import Swirl
 from bemt.physics.effects.tip_loss import TipLoss
 from bemt.physics.sections.polars import Polar, linear_polar
+from geometry.laws import helix
 from geometry.rotor import Rotor, Stations
 
 AIR = Air.from_density(1.2)
@@ -342,6 +343,23 @@ def test_nonsense_in_the_balance_ends_in_words(rotor: Rotor, polar: Polar, K: fl
     assert not s.converged.any()
     assert np.isnan(s.T).all()
     assert all(solver.REASONS[reason] in flags[0] for flags in s.flags)
+
+
+def test_a_point_below_the_reynolds_numbers_of_its_tables_is_flagged() -> None:
+    """Where they end, no sooner; tables of one Reynolds number state none, and without its effect none is read."""
+    rotor, wide = Rotor(helix(0.254, 0.127), 2), linear_polar(cd=0.01)
+    Re = np.array([5e4, 1e5, 2e5])
+    some = dataclasses.replace(wide, Re=Re, cl=wide.cl[:, :3], cd=wide.cd[:, :3])
+    one = dataclasses.replace(wide, Re=Re[:1], cl=wide.cl[:, :1], cd=wide.cd[:, :1])
+    prep = solver.prepare(rotor, [(0.75, some)])
+    assert prep.Re_bottom == pytest.approx(5e4)
+    chord = float(np.interp(0.75 * rotor.R, prep.stations.r, prep.stations.chord))
+    edge = 60.0 * 5e4 * AIR.mu / (AIR.rho * chord * 0.75 * math.pi * prep.D)  # rev/min at rest
+    found = solver.solve(prep, edge * np.array([0.5, 0.98, 1.02, 2.0]), 0.0, AIR)
+    assert [any("Re at 0.75 R below" in w for w in flags) for flags in found.flags] == [True, True, False, False]
+    assert not any(solver.solve(prep, 0.98 * edge, 0.6 * edge / 60.0 * prep.D, AIR).flags), "wind counts"
+    for polar, effects in ((one, standard()), (some, without(standard(), ["reynolds"]))):
+        assert not any(solver.solve(solver.prepare(rotor, [(0.75, polar)], effects), 0.5 * edge, 0.0, AIR).flags)
 
 
 def test_words_for_unusual_states(rotor: Rotor, polar: Polar) -> None:

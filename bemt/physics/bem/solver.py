@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.arrays import Array
+from bemt.physics import coefficients as co
 from bemt.physics.air import Air
 from bemt.physics.bem import kernel as K
 from bemt.physics.bem import packing as arrays
@@ -46,6 +47,8 @@ THICKNESS = 0.12
 """Thickness over chord of blades whose sections are not known [1]."""
 
 _RAD_PER_RPM = math.pi / 30.0
+# Share of the least Reynolds number of tables that is no departure from it.
+_ROUND = 0.01
 _NO_COLUMNS = np.empty((1, 0, K.N_RADIAL))
 # Fewer points than this are not worth a thread.
 _THREAD_MIN = 64
@@ -69,6 +72,7 @@ class Prepared:
     num: Array
     grid: Array
     cone: float | None = None  # Coning angle of blades on flapping hinges; None: stiff blades [rad]
+    Re_bottom: float = 0.0  # Least Reynolds number of the tables at 0.75 R; 0 when they do not depend on it [1]
 
     @property
     def D(self) -> float:
@@ -187,7 +191,8 @@ def prepare(
     if not polars:
         raise ValueError("polars: got none; expected at least one (r/R, Polar) pair")
     eff = standard() if effects is None else tuple(effects)
-    if not any(e.id == "reynolds" for e in eff):
+    by_Re = any(e.id == "reynolds" for e in eff)
+    if not by_Re:
         polars = [(x, arrays.at_fixed_re(p)) for x, p in polars]
     for e in (e for e in eff if type(e).duct is not Effect.duct):
         duct = _enclosed(duct, e.duct(rotor.R, duct is not None))
@@ -209,7 +214,10 @@ def prepare(
     num = _numbers(bake, duct)
     st, tab, grid = arrays.pack_stations(bake, num), arrays.pack_tables(bake), arrays.pack_grid(bake)
     cone = None if math.isnan(bake.num.cone) else bake.num.cone
-    return Prepared(rotor, s, eff, duct, st, tab, (bake.M2.size, bake.Re.size), num, grid, cone)
+    at_75 = arrays.blend_weights(np.array([0.75]), np.array([x for x, _ in polars]))[0] > 0.0
+    least = [float(p.Re[0]) for (_, p), used in zip(polars, at_75, strict=True) if used and p.Re.size > 1]
+    bottom = max(least, default=0.0) if by_Re else 0.0
+    return Prepared(rotor, s, eff, duct, st, tab, (bake.M2.size, bake.Re.size), num, grid, cone, bottom)
 
 
 def _build(
@@ -447,13 +455,15 @@ def _flags(prep: Prepared, points: Array, out: Array, ok: NDArray[np.bool_]) -> 
     # the columns of the words, each a small whole number
     status = np.where(ok | (out[:, K.O_STATUS] > 0), out[:, K.O_STATUS], K.NOT_FINITE)
     counts = [out[:, i] for i in (K.O_BRIDGED, K.O_STAGNANT, K.O_REVERSED)]
-    columns = [status, np.where(ok, -1.0, out[:, K.O_WHERE]) + 1.0, *counts, mach > prep.mach_top, behind]
+    # of the rotation, at 0.75 R, where a rotor is judged
+    slow = _Re75(prep, points) < (1.0 - _ROUND) * prep.Re_bottom
+    columns = [status, np.where(ok, -1.0, out[:, K.O_WHERE]) + 1.0, *counts, mach > prep.mach_top, slow, behind]
     wet, cavitates = points[:, K.P_RHO] > WET, np.zeros(n, dtype=bool)
     if wet.any():
         cavitates = wet & (out[:, K.O_T] > keller_N(prep.rotor))
     columns.append(cavitates)
     backwards = behind if prep.duct is not None else np.zeros(n, dtype=bool)
-    loud = np.flatnonzero(~ok | (mach > prep.mach_top) | backwards | cavitates | (np.sum(counts, axis=0) > 0))
+    loud = np.flatnonzero(~ok | (mach > prep.mach_top) | slow | backwards | cavitates | (np.sum(counts, axis=0) > 0))
     flags: list[tuple[str, ...]] = [()] * n
     if loud.size == 0:
         return tuple(flags)
@@ -468,9 +478,16 @@ def _flags(prep: Prepared, points: Array, out: Array, ok: NDArray[np.bool_]) -> 
     return tuple(flags)
 
 
+def _Re75(prep: Prepared, points: Array) -> Array:
+    """Reynolds number at 0.75 R without induced velocity, (P,) [1]."""
+    chord = float(np.interp(0.75 * prep.rotor.R, prep.stations.r, prep.stations.chord))
+    turns = points[:, K.P_OMEGA] / (2.0 * np.pi)
+    return np.asarray(co.Re75(chord, turns, prep.D, *(points[:, i] for i in (K.P_V, K.P_RHO, K.P_MU))))
+
+
 def _words(
-    prep: Prepared, status: int, where: int, bridged: int, stagnant: int, reversed_: int, fast: int, behind: int,
-    cavitates: int,
+    prep: Prepared, status: int, where: int, bridged: int, stagnant: int, reversed_: int, fast: int, slow: int,
+    behind: int, cavitates: int,
 ) -> tuple[str, ...]:  # fmt: skip
     words: list[str] = []
     n = prep.st.shape[0]
@@ -488,6 +505,8 @@ def _words(
         words.append("onset flow from behind the duct: exit and lip losses are not known in that direction")
     if fast:
         words.append(f"helical tip Mach above {prep.mach_top:.2f}: section tables held at their last Mach number")
+    if slow:
+        words.append(f"Re at 0.75 R below {prep.Re_bottom:,.0f}: section tables held at their least Reynolds number")
     if cavitates:
         words.append(
             f"cavitates at a depth of 1 m: blades of this area take {keller_N(prep.rotor):.3g} N (Keller 1966)"
