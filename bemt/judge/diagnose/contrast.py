@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from bemt.base.action import Answered, Told
 from bemt.base.document import rows_of
@@ -161,13 +161,15 @@ def compare(
 
 def _read(given: Any, name: str, run: Mapping[str, Any]) -> Dataset:
     """A recording as the user states it."""
-    from bemt.data.recordings.load import as_stated, import_file
+    from bemt.data.recordings.load import as_stated, one_as_stated
     from bemt.judge.diagnose.load import is_table
     from bemt.physics.dataset import Dataset, from_pandas
 
-    told = as_stated([given if is_table(given) else name], {k: v for k, v in run.items() if k != "rpm"})[0]
+    if not is_table(given):
+        return one_as_stated(name, run)
+    told = as_stated([given], {k: v for k, v in run.items() if k != "rpm"})[0]
     made = from_pandas(told, name=name) if hasattr(told, "columns") else told
-    return made if isinstance(made, Dataset) else import_file(name)
+    return cast(Dataset, made)
 
 
 def _next(said: ComparedRuns, change: RunChange, asked: Invocation) -> Mapping[str, Any]:
@@ -194,11 +196,12 @@ def compared(
         if case is None:
             hint = "Two recordings, A B, need none"
             raise InputError(Fault("--case", "", "one recording and no case", "the case to compare it with", hint))
-        one = one_run.compare_run(as_stated([a], run or {})[0], case, progress)
+        typed = "" if is_table(a) else os.fspath(a)
+        one = one_run.compare_run(as_stated([a], run or {})[0], case, progress, file=typed)
         found = Told(one.document(), one_run.text(one), one_run.text(one, details=True))
     elif is_table(a) or is_table(b):
         found = two()
-    elif (runs := two_runs.compare_runs(a, b, rows_a, rows_b)) is not None:
+    elif (runs := two_runs.compare_runs(a, b, rows_a, rows_b, run or {})) is not None:
         found = Told(runs.document(), runs.text)
     else:
         found = two()
