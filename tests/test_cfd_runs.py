@@ -970,3 +970,22 @@ def test_coefficients_of_a_solver_are_loads_by_its_reference_values(put: Callabl
     told = {"area_m2": AREA, "length_m": LENGTH, "speed_m_s": SPEED, "density_kg_m3": RHO}
     run = run_of(["ct.out", "cq.out"], {"rpm": RPM}, columns=columns, reference=told)
     assert (run["thrust_N"][0], run["torque_Nm"][0]) == pytest.approx((T, Q), rel=1e-4)
+
+
+def test_two_folders_of_exports_are_compared_at_the_speed_that_is_typed(
+    put: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    foam(put)
+    for name in ("one", "two"):
+        shutil.copytree("postProcessing", tmp_path / name / "postProcessing")
+    force = next((tmp_path / "two").rglob("force*.dat"))
+    force.write_text(force.read_text() + "# another run\n")
+    folders = ["one/postProcessing", "two/postProcessing"]
+    assert main(["compare", *folders]) == 2
+    assert "--rpm" in capsys.readouterr().err
+    assert main(["compare", *folders, "--rpm", "8000", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert [point["rpm"] for point in told["points"]] == [8000.0]
+    assert all(load["A"] > 0.0 and load["difference"] == 0.0 for load in told["points"][0]["loads"].values())
+    assert main(["compare", folders[0], "--case", "10x5", "--rpm", "8000"]) in (0, 1)
+    assert f"bemt diagnose {folders[0]} " in " ".join(capsys.readouterr().out.split())

@@ -163,7 +163,7 @@ def compare(
     air_a, air_b : str, optional
         Air of `a` or `b`, overrides the recording: 22C,1013hPa, or only 22C, or 1.19kg/m3; wind: 18m/s, 35kt.
     rpm : float, optional
-        One file beside the case: its speed, where no file states it. [rev/min]
+        Speed of exports of CFD, or of one file beside the case, where no file states it. [rev/min]
     unit : mapping
         Unit of a quantity or heading of both tables, or of one CFD run, that states none: thrust=N.
     column : mapping

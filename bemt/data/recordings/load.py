@@ -172,6 +172,12 @@ def as_stated(files: Sequence[Any], run: Mapping[str, Any]) -> list[Any]:
     return list(runs_of(files, run_from(list(files), **of_runs), insist=True)[0])
 
 
+def one_as_stated(file: str, run: Mapping[str, Any]) -> Dataset:
+    """One of two recordings as stated; a speed is that of exports of CFD, as tables of measurements have it."""
+    told = as_stated([file], {k: v for k, v in run.items() if k != "rpm" or not is_measured(file)})[0]
+    return told if isinstance(told, Dataset) else import_file(file)
+
+
 def stated_options(run: Mapping[str, Any]) -> dict[str, Sequence[str]]:
     """Options of a command that state the columns of tables.
 

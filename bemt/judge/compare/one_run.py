@@ -137,14 +137,16 @@ def cfd_points(
 
 
 def compare_run(
-    path: str | os.PathLike[str] | Dataset, case: Any, progress: Callable[[str], None] | None = None, called: str = ""
-) -> RunComparison:
+    path: str | os.PathLike[str] | Dataset, case: Any, progress: Callable[[str], None] | None = None, called: str = "",
+    file: str = "",
+) -> RunComparison:  # fmt: skip
     """Put one run (run.toml, a folder of exports, or a table of CFD points) and the model of a case side by side.
 
-    A file that is no run, or of another rotor, is refused.
+    A file that is no run, or of another rotor, is refused. `called` and `file` are what the case and a Dataset were
+    typed as.
     """
     given = path if isinstance(path, Dataset) else None
-    name = os.fspath(path) if not isinstance(path, Dataset) else path.file or path.name
+    name = os.fspath(path) if not isinstance(path, Dataset) else file or path.file or path.name
     made = rotor_of(case).case
     points, imported = cfd_points(name, given, (made.diameter_m, float(made.air().rho), made.ducted))
     completed, of_case = _completed(points, made)

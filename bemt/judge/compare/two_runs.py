@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,15 +118,17 @@ def _grid_lines(ratios: Mapping[str, GridRatio]) -> list[str]:
     return lines if ratios else [*lines, "  no point at equal speed and airspeed"]
 
 
-def compare_runs(a: str, b: str, rows_a: Sequence[str] = (), rows_b: Sequence[str] = ()) -> TwoRuns | None:
+def compare_runs(
+    a: str, b: str, rows_a: Sequence[str] = (), rows_b: Sequence[str] = (), run: Mapping[str, Any] | None = None
+) -> TwoRuns | None:
     """Answer for two CFD recordings on two grids, or of which one has a single speed; None for all others.
 
-    Rows to use are named as ``level=5``.
+    Rows to use are named as ``level=5``; ``run`` is what the user states of the files.
     """
-    from bemt.data.recordings.load import import_file
+    from bemt.data.recordings.load import one_as_stated
 
     try:
-        first, second = (selected(import_file(p), list(rows), p) for p, rows in ((a, rows_a), (b, rows_b)))
+        first, second = (selected(one_as_stated(p, run or {}), list(rows), p) for p, rows in ((a, rows_a), (b, rows_b)))
         rows = {"A": tuple(rows_a), "B": tuple(rows_b)}
         differ = cfd_setup.conditions_that_differ(first, second)
         if words := cfd_setup.grid_that_differs(first, second):

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from bemt.base.action import Told
 from bemt.base.document import rows_of
@@ -19,7 +19,7 @@ from bemt.base.page import FIRST
 from bemt.base.tables import json_text, write_atomic
 from bemt.base.units import INCH
 from bemt.data.recordings.check import OPEN_OR_OUT, check, left_out
-from bemt.data.recordings.load import as_stated, import_file, stated_options
+from bemt.data.recordings.load import as_stated, import_file, one_as_stated, stated_options
 from bemt.judge.compare import one_run, two_runs
 from bemt.judge.compare.change_document import DIAGNOSED, ComparedRuns, RankedCause, document, next_step, text
 from bemt.judge.compare.matched import stand_run
@@ -142,9 +142,11 @@ def compare(
 
 def _read(given: Any, name: str, rows: Sequence[str], air: str | None, option: str, run: Mapping[str, Any]) -> Dataset:
     """A recording as the user states it."""
-    told = as_stated([given if is_table(given) else name], {k: v for k, v in run.items() if k != "rpm"})[0]
-    made = from_pandas(told, name=name) if hasattr(told, "columns") else told
-    made = made if isinstance(made, Dataset) else import_file(name)
+    if is_table(given):
+        told = as_stated([given], {k: v for k, v in run.items() if k != "rpm"})[0]
+        made = from_pandas(told, name=name) if hasattr(told, "columns") else cast(Dataset, told)
+    else:
+        made = one_as_stated(name, run)
     return with_air(selected(made, list(rows), name), air, option)
 
 
@@ -167,9 +169,10 @@ def compared(
         if case is None:
             hint = "Two recordings, A B, need none"
             raise InputError(Fault("--case", "", "one recording and no case", "the case to compare it with", hint))
-        one = one_run.compare_run(as_stated([a], run or {})[0], case, progress)
+        typed = "" if is_table(a) else os.fspath(a)
+        one = one_run.compare_run(as_stated([a], run or {})[0], case, progress, file=typed)
         found = Told(one.document(), one_run.text(one), one_run.text(one, details=True))
-    elif not tables and (runs := two_runs.compare_runs(a, b, rows_a, rows_b)) is not None:
+    elif not tables and (runs := two_runs.compare_runs(a, b, rows_a, rows_b, run or {})) is not None:
         found = Told(runs.document(), runs.text)
     else:
         found = compare(a, b, case, label=label, diameter_m=diameter_m, rows_a=rows_a, rows_b=rows_b, air_a=air_a,

@@ -200,7 +200,8 @@ def _faults(w: Wanted) -> list[Fault]:
         *_broken(
             (stations and scan, "--scan, --stations", "both", "one of them", ""),
             (nothing, "label, --stations", "neither", "one of them, or --scan", "As in: new 10x5"),
-            (w.fan and drawn, "--fan", "together with a blade file", "--fan with the diameter as label", ""),
+            (w.fan and drawn, "--fan", "together with a blade file", "--fan with the diameter as label",
+             'Without --fan; then kind = "fan" and [duct] into the case (docs/duct.md)'),
             (scan and w.blades is not None, "--blades", f"{w.blades}", "nothing with --scan, which shows them", ""),
             (w.unit is not None and not scan, "--unit", f"{w.unit}", "nothing without --scan", ""),
         ),
