@@ -1,4 +1,4 @@
-"""`diagnose --reference`: the change of loads answers what the case leaves open."""
+"""What stands beside an answer: the reference, whose loads say what the case leaves open, and the band of the case."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from bemt import diagnose, propeller
 from bemt.app.cli import main
 from bemt.base.errors import EXIT_OK
 
@@ -63,3 +65,17 @@ def test_a_load_that_changed_its_sign_is_not_the_same(tmp_path: Path, capsys: py
     """Ratios compare sizes, so they must not say that such recordings agree."""
     found = asked(capsys, written(tmp_path / "a.csv", 1), written(tmp_path / "b.csv", 2, thrust=-1.0))
     assert found["verdict"] != "none" and "No change" not in found["headline"], found["headline"]
+
+
+@pytest.mark.parametrize(("share", "asks"), [(0.5, True), (1.0, False)])
+def test_loads_that_all_lie_beside_the_band_ask_for_the_rotor_and_those_inside_do_not(share: float, asks: bool) -> None:
+    """No reading inside the band of the case is another rotor sooner than any cause; all inside hide the level."""
+    rotor, rng = propeller("10x5"), np.random.default_rng(1)
+    rpm = np.linspace(4000.0, 11000.0, 14)
+    loads = rotor.solve(rpm, bands=False)
+    read = {name: share * loads[name] * (1.0 + 0.01 * rng.standard_normal(14)) for name in ("thrust_N", "torque_Nm")}
+    answer = diagnose(pd.DataFrame({"rpm": rpm, **read}), rotor)
+    assert not answer.effects
+    inside = "0 of 14" if asks else "14 of 14"
+    assert answer.beside.count(inside) == 2 and answer.beside.endswith("?") is asks
+    assert answer.text.replace("\n", " ").startswith(answer.beside)

@@ -19,7 +19,7 @@ from bemt.data.recordings.load import as_stated, import_file, stated_options
 from bemt.data.recordings.shown import options_of
 from bemt.judge.compare import one_run
 from bemt.judge.diagnose import figures as pictures
-from bemt.judge.diagnose import folder
+from bemt.judge.diagnose import folder, other_rotor
 from bemt.judge.diagnose.along_blade import AlongBlade
 from bemt.judge.diagnose.along_blade import along as along_blade
 from bemt.judge.diagnose.answer import Diagnosis
@@ -84,7 +84,7 @@ class Answer(Judged):
     propeller: Propeller
     document: dict[str, Any]
     blade: dict[str, AlongBlade]
-    beside: str = ""  # That all readings lie inside the band of the case, where they do and no cause is claimed
+    beside: str = ""  # How all readings lie to the band of the case, where they lie alike and no cause is claimed
 
     def __repr__(self) -> str:
         """Say the verdict in a line."""
@@ -192,8 +192,8 @@ def diagnosed(
     if target is not None:
         made = [rotor_of(one).text for one in given] if len(given) == len(cases) else []  # a label has no file
         folder.write(target, answer, told, cases, figures, made)
-    inside = "" if answer.said.verdict in CLAIMS else _inside(records, chosen)
-    return Answer(answer, rotor_of(given[0] if len(given) == 1 and cases else cases[0]), told, blade, inside)
+    lies = "" if answer.said.verdict in CLAIMS else _beside_band(answer, records, chosen)
+    return Answer(answer, rotor_of(given[0] if len(given) == 1 and cases else cases[0]), told, blade, lies)
 
 
 def _along(blade: Mapping[str, AlongBlade]) -> dict[str, Any]:
@@ -208,17 +208,21 @@ def _too_few(error: InputError, found: one_run.RunComparison, blade: Mapping[str
     return OnePoint(told, "\n\n".join([lead, *(c.text() for c in blade.values())]))
 
 
-def _inside(records: Sequence[Record], cases: Sequence[Case]) -> str:
-    """That every reading lies inside the band of its case, and what that hides; "" where one does not."""
+def _beside_band(answer: Diagnosis, records: Sequence[Record], cases: Sequence[Case]) -> str:
+    """That every reading lies inside the band of its case, and what that hides, or that none does; else ""."""
     own = [r for r in records if not r.reference]
     (view, *more) = pictures.first_picture(own, cases)
     counts = [view.inside(c)[:2] for c in view.channels]
-    if more or any(n != total for n, total in counts) or not any(t for _, t in counts):
+    if more or not any(total for _, total in counts):
         return ""
-    wide = " and ".join(f"{100.0 * w:.0f} %" for w in map(view.width, view.channels) if np.isfinite(w))
-    alone = wide and not any(r.reference for r in records)
-    hides = f" (± {wide} wide: a level inside it tells nothing)" if alone else ""
-    return view.sentence.partition(";")[0].rstrip(".") + f"{hides}."
+    told, alone = view.sentence.partition(";")[0].rstrip("."), len(own) == len(records)
+    if all(n == total for n, total in counts):
+        wide = " and ".join(f"{100.0 * w:.0f} %" for w in map(view.width, view.channels) if np.isfinite(w))
+        return f"{told}{f' (± {wide} wide: a level inside it tells nothing)' if alone and wide else ''}."
+    doubted = other_rotor.foreign(answer.problem) or other_rotor.doubted(answer.problem, answer.said)
+    if alone and not doubted and not any(n for n, _ in counts) and not answer.problem.findings:
+        return f"{told}: are diameter, pitch and blades of the case those of this rotor?"
+    return ""
 
 
 def _both_there(
