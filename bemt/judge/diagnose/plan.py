@@ -108,18 +108,7 @@ class Plan(Answered):
         return "\n".join([*out, *(f"  note: {note}" for note in self.notes)])
 
     def _document(self) -> Mapping[str, object]:
-        """Schema ``bemt.plan/1``."""
-        c = self.confusion
-        return {
-            "schema": SCHEMA, "points": self.points, "sight": self.sight,
-            "size": {i: float(s) for i, s in zip(c.ids, self.size, strict=True)},
-            "size_at_best": {i: float(s) for i, s in zip(c.ids, self.best, strict=True)},
-            "classes": c.classes(),
-            "distance": {i: {j: float(c.distance[a, b]) for b, j in enumerate(c.ids)} for a, i in enumerate(c.ids)},
-            "not_tried": self.absent,
-            "next_measurement": None if self.added is None else self.added.document(),
-            "notes": list(self.notes),
-        }  # fmt: skip
+        return document(self)
 
 
 def given(points: Any, case: Case) -> Record:
@@ -198,3 +187,18 @@ def _sizes(
             apart = true(c.signatures - shown[:, i, None])
             least[k, i] += log_sum(-0.5 * np.sum(apart**2, axis=0), np.log(c.weight))
     return [np.asarray(row) for row in np.sqrt(2.0 * np.maximum(least, 0.0))]
+
+
+def document(answer: Plan) -> Mapping[str, object]:
+    """Give the document ``bemt.plan/1``."""
+    c = answer.confusion
+    return {
+        "schema": SCHEMA, "points": answer.points, "sight": answer.sight,
+        "size": {i: float(s) for i, s in zip(c.ids, answer.size, strict=True)},
+        "size_at_best": {i: float(s) for i, s in zip(c.ids, answer.best, strict=True)},
+        "classes": c.classes(),
+        "distance": {i: {j: float(c.distance[a, b]) for b, j in enumerate(c.ids)} for a, i in enumerate(c.ids)},
+        "not_tried": answer.absent,
+        "next_measurement": None if answer.added is None else answer.added.document(),
+        "notes": list(answer.notes),
+    }  # fmt: skip

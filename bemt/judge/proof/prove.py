@@ -23,7 +23,7 @@ from bemt import __version__
 from bemt.base.checkout import commit
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, write_atomic
-from bemt.judge.proof import causes, real, rows, score
+from bemt.judge.proof import causes, rows, score
 from bemt.judge.proof.causes import CAUSES, LISTED, UNLISTED, extended
 from bemt.judge.proof.items import Bench, Item, NoSolutionError, make_item
 from bemt.judge.proof.rows import Entry, Key, Miss, Proof, ScoreRow, ToldAnswer
@@ -224,6 +224,7 @@ TIME_LIMIT_S = 900.0
 
 def conceal(out: Path, size: str, seed: int, say: Callable[[str], None] | None = None, jobs: int = 1) -> str:
     """Draw and write all items, and the sealed key."""
+    from bemt.judge.proof import real
     from bemt.physics import effects
 
     if (out / "items").exists() or (out / rows.KEY).exists():
