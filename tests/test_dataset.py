@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import math
 import pickle
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import get_type_hints
 
 import numpy as np
 import pandas as pd
@@ -13,6 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bemt.base.arrays import Array
 from bemt.base.errors import InputError
 from bemt.physics import coefficients as co
 from bemt.physics.dataset import Dataset, concat, from_pandas
@@ -211,3 +214,10 @@ def test_columns_of_text_in_a_frame_stay_text() -> None:
 def test_it_iterates_over_the_names_that_in_and_brackets_take() -> None:
     d = Dataset("bemt", "p", {"rpm": [4000.0, 6000.0], "thrust_N": [2.1, 4.7]})
     assert list(d) == ["rpm", "thrust_N"] and all(name in d and len(d[name]) == len(d) for name in d)
+
+
+def test_the_uncertainties_of_an_answer_are_typed_as_arrays() -> None:
+    """As `d[channel]` is; the constructor takes numbers, too."""
+    assert get_type_hints(Dataset)["u"] == Mapping[str, Array]
+    d = Dataset("bench", "run", {"rpm": [6000.0, 7000.0]}, {"rpm": 10.0})
+    assert isinstance(d.u["rpm"], np.ndarray) and d.u["rpm"].tolist() == [10.0, 10.0]

@@ -15,9 +15,10 @@ Outside of the wake the lower rotor feels the upwash of the cylinders, -A.  The 
 its disk, keeps its angular momentum; it adds to the speed of blades that turn against it and takes from that of blades
 that turn with it.  A rotor has no swirl ahead of it.
 
-With k = 0.707 and far apart that is the balance of Leishman and Ananthan (2008; equation numbers not checked), whose
-lower rotor sees 2 v on half of its area.  Limits (tested): both rotors are alone at a great distance; at z = 0 both see
-the velocity that both induce, so that equal thrusts cost sqrt(2) times the ideal power of two rotors alone.
+With k = 0.707 and a developed wake, a few diameters down, that is the balance of Leishman and Ananthan (2008; equation
+numbers not checked), whose lower rotor sees 2 v on half of its area.  Their wake never ends; ours is a jet from 6.2 of
+its diameters on.  Limits (tested): both rotors are alone at a great distance; at z = 0 both see the velocity that both
+induce, so that equal thrusts cost sqrt(2) times the ideal power of two rotors alone.
 """
 
 from __future__ import annotations

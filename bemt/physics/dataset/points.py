@@ -121,7 +121,7 @@ class Dataset:
     kind: str
     name: str
     values: Mapping[str, Any]
-    u: Mapping[str, Any] = field(default_factory=dict)
+    u: Mapping[str, Array] = field(default_factory=dict)
     flags: tuple[tuple[str, ...], ...] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict)
     labels: tuple[str, ...] = ()
@@ -130,6 +130,15 @@ class Dataset:
     units: Mapping[str, str] = field(default_factory=dict)
     lines: Sequence[int] = ()
     texts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    if TYPE_CHECKING:  # u is made of arrays or numbers, and has arrays
+
+        def __init__(
+            self, kind: str, name: str, values: Mapping[str, Any], u: Mapping[str, Any] = ...,
+            flags: Iterable[tuple[str, ...]] = ..., provenance: Mapping[str, Any] = ..., labels: Iterable[str] = ...,
+            u_by: Mapping[str, Mapping[str, Any]] = ..., notes: Iterable[str] = ..., units: Mapping[str, str] = ...,
+            lines: Sequence[int] = ..., texts: Mapping[str, tuple[str, ...]] = ...,
+        ) -> None: ...  # fmt: skip
 
     def __post_init__(self) -> None:
         values = {key: _frozen(v) for key, v in self.values.items()}
@@ -278,7 +287,7 @@ class Dataset:
         """Access a channel as an attribute, such as ``d.thrust_N``, and its uncertainty as ``d.u_thrust_N``."""
         values, name = self.__dict__.get("values", {}), channel.removeprefix("u_")
         if channel in values or name in values:
-            return values[channel] if channel in values else self.u[name]  # type: ignore[no-any-return]
+            return values[channel] if channel in values else self.u[name]
         raise AttributeError(_absent(channel, values))
 
     def unit(self, channel: str) -> str:

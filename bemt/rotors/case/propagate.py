@@ -249,7 +249,7 @@ def _unknowns_of_second(case: Case) -> tuple[Assumption, ...]:
     return tuple(item for item in case.second().assumptions if not item.key.startswith(shared))
 
 
-def _flagged(flags: Iterable[tuple[str, ...]], where: Array, word: str) -> tuple[tuple[str, ...], ...]:
+def _flagged(flags: Iterable[tuple[str, ...]], where: Iterable[bool], word: str) -> tuple[tuple[str, ...], ...]:
     """Flags of each point, with one more where it holds."""
     return tuple((*f, word) if holds else f for f, holds in zip(flags, where, strict=True))
 
