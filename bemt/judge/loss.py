@@ -253,19 +253,22 @@ def minutes(kind: str, points: int) -> float:
 
 
 def checks_by_worth(P: Mapping[Explanation, float], again: float = math.inf) -> list[str]:
-    """Causes whose check takes away most doubt a minute, 2 p (1 - p) over its time, most first; "": another run.
+    """Causes in the order of checks that finds the one at fault soonest, by probability over time; "": another run.
 
-    A run as before takes ``again`` minutes and tells a cause from none. What anyone at the stand would see, a second
-    rotor or a duct, needs no check: whoever reads the answer knows it.
+    That order has the least expected time (Mitten 1960, J. Industrial Engineering 11:17; not checked). A run as before
+    takes ``again`` minutes and tells a cause from none. What anyone at the stand would see, a second rotor or a duct,
+    needs no check: whoever reads the answer knows it.
 
     >>> P = {Explanation.of("section"): 0.6, Explanation.of("propeller"): 0.1, Explanation.of("duct"): 0.2, NONE: 0.1}
     >>> checks_by_worth(P), checks_by_worth(P, 16.0)
     (['propeller', 'section'], ['propeller', '', 'section'])
+    >>> checks_by_worth({Explanation.of("thrust_gain"): 0.77, Explanation.of("diameter"): 0.05, NONE: 0.18})
+    ['thrust_gain', 'diameter']
     """
     known = effects.catalogue()
     names = {i for k in P for i in k.ids if i in known and known[i].check and not known[i].evident}
     odds = {i: (sum(p for k, p in P.items() if i in k.ids), known[i].check_minutes) for i in sorted(names)}
     if math.isfinite(again):
         odds[""] = P.get(NONE, 0.0), again
-    worth = {i: 2.0 * p * (1.0 - p) / time for i, (p, time) in odds.items()}
+    worth = {i: p / time for i, (p, time) in odds.items()}
     return sorted(worth, key=lambda i: -worth[i])

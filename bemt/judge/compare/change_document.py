@@ -109,7 +109,7 @@ def _lacking(change: RunChange, asked: Invocation) -> tuple[str, str] | None:
 
 
 def _quickest_checks(change: RunChange, asked: Invocation) -> tuple[str, str]:
-    """Checks that take away most doubt a minute, one of each family; or the run of A again."""
+    """Checks that find the cause soonest, one of each family; or the run of A again."""
     said = change.leading
     members = [k for k in said.effects if check_of(k)]
     order = checks_by_worth(said.ranked, minutes("reference", len(change.a.points)))
