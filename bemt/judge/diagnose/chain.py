@@ -152,8 +152,11 @@ def _decided(P: Mapping[Explanation, float], plain: Mapping[Explanation, float])
 
 def _with_drive(rotor: Diagnosis, motor: Diagnosis) -> Diagnosis:
     """Answer on loads and drive, measured apart: loads at the measured speed, the speed at the pulse width."""
-    P, Q = loss.parts(rotor.found.probability, _of_motor(motor.found))
-    loads, drive = loss.decide(P).reasoned_as(rotor.said), _decided(Q, motor.found.probability)
+    P, Q = loss.parts(rotor.found.probability, motor.found.probability)
+    rotor, motor = (
+        replace(d, found=replace(d.found, probability=p)) for d, p in ((rotor, P), (motor, Q))
+    )  # each beside the other
+    loads, drive = loss.decide(P).reasoned_as(rotor.said), _decided(_of_motor(motor.found), Q)
     said = loss.joined(loads, drive, P.get(NONE, 0.0))
     if said.by == "drive":
         return replace(motor, said=said, drive=motor, loads=rotor, absent=rotor.absent)
