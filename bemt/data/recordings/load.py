@@ -116,23 +116,6 @@ def _of_no_run(names: list[str], runs: Sequence[Dataset], to_do: str | None) -> 
             and not (Path(n).name == WALLS and (to_do or n in whole))]  # fmt: skip
 
 
-def _read_each(
-    names: Sequence[str],
-    format: str | None,
-    choice: Choice | None,
-    stated: Mapping[str, Dataset],  # noqa: A002
-) -> tuple[dict[str, Dataset], dict[str, str]]:
-    """Recordings of files, and why others were refused, by name."""
-    records: dict[str, Dataset] = {}
-    errors: dict[str, str] = {}
-    for name in names:
-        try:
-            records[name] = stated[name] if name in stated else import_file(name, format, choice)
-        except Exception as error:  # the other files are read all the same
-            errors[name] = _refusal(error)
-    return records, errors
-
-
 def import_files(
     paths: Iterable[str | os.PathLike[str]], format: str | None = None, choice: Choice | None = None,  # noqa: A002
     run: RunToml | None = None, insist: bool = False, stated: Mapping[str, Dataset] = {},  # noqa: B006
@@ -145,7 +128,13 @@ def import_files(
     names = [os.fspath(path) for path in paths]
     runs, to_do = runs_of(names, run, insist)
     names = _of_no_run(names, runs, to_do)
-    records, errors = _read_each(names, format, choice, stated)
+    records: dict[str, Dataset] = {}
+    errors: dict[str, str] = {}
+    for name in names:
+        try:
+            records[name] = stated[name] if name in stated else import_file(name, format, choice)
+        except Exception as error:  # the other files are read all the same
+            errors[name] = _refusal(error)
     if none := _without_loads(records, bool(runs)):
         records = {name: record for name, record in records.items() if name not in none}
         errors, to_do = errors | none, None
