@@ -189,6 +189,40 @@ def _checked(
 _USED = ("rpm", "thrust_N", "CT", "J", "airspeed_m_s", "density_kg_m3", "temperature_K", "pressure_Pa")
 
 
+_Key = tuple[str, float, float, float, bool]
+"""Name, diameter and pitch [m], blades and duct of a propeller."""
+
+
+def _by_propeller(keys: Iterable[_Key]) -> tuple[dict[_Key, list[int]], list[int]]:
+    """Rows of each propeller; those without a positive diameter, pitch and blade count."""
+    groups: dict[_Key, list[int]] = {}
+    bad: list[int] = []
+    for i, key in enumerate(keys):
+        known = all(np.isfinite(v) and v > 0 for v in key[1:4]) and key[3] == round(key[3])
+        (groups.setdefault(key, []) if known else bad).append(i)
+    return groups, bad
+
+
+def _of_propeller(file: str, key: _Key, part: Dataset, wrong: list[str], doubtful: list[str]) -> Gathered:
+    """Steady points of the rows of one propeller; refused where they are `wrong`."""
+    name, D, pitch, B, inside = key
+    try:
+        points = None if wrong else reduce(part, diameter_m=D)
+    except InputError as error:
+        points, wrong = None, [fault.got for fault in error.faults]
+    if points is None:
+        return [], [f"{file}: {name}: {words}" for words in wrong], []
+    refused = [f"{file}: {name}: {words}" for words in dropped_words(reduction(points))]
+    notes = [f"{file}: {name}: {words}" for words in doubtful]
+    if "CT" not in points and "thrust_N" in points:
+        points = points.derive(D, RHO)
+        notes.append(f"{file}: no density, {RHO:g} kg/m3 assumed")
+    if not {"rpm", "CT"} <= points.values.keys():
+        return [], [*refused, f"{file}: {name}: no row with a speed and a thrust"], notes
+    made = MeasuredPropeller(str(name), re.split("[_ ]", str(name))[0], Path(file).name, D, pitch, int(B), bool(inside))
+    return [(made, points.rpm, points["J"] if "J" in points else np.zeros(len(points)), points["CT"])], refused, notes
+
+
 def _from_table(file: str, found: Dataset, label: str | None = None) -> Gathered:
     """Steady points of each propeller of a recording, or of any table with the columns of the module notes."""
     (D, pitch, B, duct), names = _sizes(found, label)
@@ -202,15 +236,9 @@ def _from_table(file: str, found: Dataset, label: str | None = None) -> Gathered
     notes = [] if B is not None else [f"{file}: no column blades, 2 assumed"]
     B, duct = np.full(len(found), 2.0) if B is None else B, np.zeros(len(found)) if duct is None else duct
     sized = replace(found, values={**found.values, "diameter_m": D, "pitch_m": pitch}, lines=loaded.lines)
-    groups: dict[tuple[str, float, float, float, bool], list[int]] = {}
-    bad: list[int] = []
-    for i, key in enumerate(zip(names, D, pitch, B, duct > 0, strict=True)):
-        known = all(np.isfinite(v) and v > 0 for v in key[1:4]) and key[3] == round(key[3])
-        if known:
-            groups.setdefault(key, []).append(i)
-        else:
-            bad.append(sized.lines[i])
-    refused = [f"{file}: no positive diameter, pitch and blade count (lines {some(bad)})"] if bad else []
+    groups, bad = _by_propeller(zip(names, D, pitch, B, duct > 0, strict=True))
+    lines = some([sized.lines[i] for i in bad])
+    refused = [f"{file}: no positive diameter, pitch and blade count (lines {lines})"] if bad else []
     if not groups:
         return [], refused, notes
     checked = {key: _checked(sized.select(np.array(at)), key[1], key[2], key[4]) for key, at in groups.items()}
@@ -221,24 +249,9 @@ def _from_table(file: str, found: Dataset, label: str | None = None) -> Gathered
     if wrong:
         checked, refused = {}, [*refused, *(f"{file}: {words}" for words in wrong)]
     rows: list[Rows] = []
-    for (name, d, p, b, inside), (part, wrong, doubtful) in checked.items():
-        made = MeasuredPropeller(str(name), re.split("[_ ]", str(name))[0], Path(file).name, d, p, int(b), bool(inside))
-        if not wrong:
-            with gathered(faults := list[Fault]()):
-                points = reduce(part, diameter_m=d)
-            wrong = [fault.got for fault in faults]
-        if wrong:
-            refused += [f"{file}: {name}: {words}" for words in wrong]
-            continue
-        refused += [f"{file}: {name}: {words}" for words in dropped_words(reduction(points))]
-        notes += [f"{file}: {name}: {words}" for words in doubtful]
-        if "CT" not in points and "thrust_N" in points:
-            points = points.derive(d, RHO)
-            notes.append(f"{file}: no density, {RHO:g} kg/m3 assumed")
-        if not {"rpm", "CT"} <= points.values.keys():
-            refused.append(f"{file}: {name}: no row with a speed and a thrust")
-            continue
-        rows.append((made, points.rpm, points["J"] if "J" in points else np.zeros(len(points)), points["CT"]))
+    for key, (part, wrong, doubtful) in checked.items():
+        made, gone, told = _of_propeller(file, key, part, wrong, doubtful)
+        rows, refused, notes = rows + made, refused + gone, notes + told
     return rows, refused, list(dict.fromkeys(notes))
 
 

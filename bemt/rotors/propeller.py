@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import glob
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -473,6 +473,23 @@ def _size_faults(told: Mapping[str, tuple[float, float]], label: str | None) -> 
     return faults
 
 
+def _source_faults(label: Any, stations: Any, told: Mapping[str, Any], blades: Any, reading: Any) -> Iterator[Fault]:
+    """Faults of what a propeller is to be made of."""
+    as_in = 'As in propeller("10x5")'
+    if (label is None) == (stations is None):
+        yield Fault("", "label, stations", "neither" if label is None else "both", "one of them", as_in)
+    if stations is not None and not told:
+        yield Fault("", "diameter_in, diameter_mm", "nothing", "the diameter, with stations")
+    if len(told) > 1:
+        yield Fault("", ", ".join(told), "together", "one of them")
+    if label is not None and not isinstance(label, str):
+        yield Fault("", "label", repr(label), "a text: diameter x pitch in inches", as_in)
+    if blades is not None and not (isinstance(blades, (int, np.integer)) and blades >= 1):
+        yield Fault("", "blades", repr(blades), "a whole number of 1 or more")
+    if stations is not None and reading is not None:
+        yield Fault("", "reading", "with stations", "a label")
+
+
 @worded
 def propeller(
     label: str | None = None, *, stations: str | os.PathLike[str] | None = None, diameter_m: float | None = None,
@@ -518,29 +535,13 @@ def propeller(
         ...
     bemt.base.errors.InputError: label: 'ten by five': got unreadable text; expected ...
     """
-    faults = []
-    if (label is None) == (stations is None):
-        got = "neither" if label is None else "both"
-        faults.append(Fault("", "label, stations", got, "one of them", 'As in propeller("10x5")'))
     sizes = {"diameter_m": (diameter_m, 1.0), "diameter_in": (diameter_in, INCH), "diameter_mm": (diameter_mm, 1e-3)}
     told = {key: (number(key, v), unit) for key, (v, unit) in sizes.items() if v is not None}
-    if stations is not None and not told:
-        faults.append(Fault("", "diameter_in, diameter_mm", "nothing", "the diameter, with stations"))
-    if len(told) > 1:
-        faults.append(Fault("", ", ".join(told), "together", "one of them"))
-    name: object = label
-    if name is not None and not isinstance(name, str):
-        faults.append(Fault("", "label", repr(label), "a text: diameter x pitch in inches", 'As in propeller("10x5")'))
-    if blades is not None and not (isinstance(blades, (int, np.integer)) and blades >= 1):
-        faults.append(Fault("", "blades", repr(blades), "a whole number of 1 or more"))
     if stations is not None:
         stations = path_text("stations", stations)
     rpm = None if rpm is None else number("rpm", rpm)
     airspeed_m_s = number("airspeed_m_s", airspeed_m_s)
-    if stations is not None and reading is not None:
-        faults.append(Fault("", "reading", "with stations", "a label"))
-    faults += _size_faults(told, label)
-    refuse(faults)
+    refuse([*_source_faults(label, stations, told, blades, reading), *_size_faults(told, label)])
     if label is not None:
         told_by = None if reading is None else reading_text(reading)
         text = fresh.label_text(label, blades, rpm, airspeed_m_s, reading=told_by)

@@ -22,6 +22,7 @@ from __future__ import annotations
 import os
 import re
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -202,6 +203,13 @@ def sniff_design_points(head: bytes | str) -> bool:
     return bool(lines) and bool(_HEAD.match(lines[0]) or labelled)
 
 
+def _column(name: str, told: Mapping[str, tuple[str, str]], units: Mapping[str, str]) -> Column:
+    """Column of a parameter, by what a comment or its heading says; its unit also by the line of units."""
+    words, unit = told.get(name) or _headed(name)
+    unit = unit or units.get(name, "")
+    return Column(words, si_unit(unit) or unit)
+
+
 def read_design_points(path: str | os.PathLike[str]) -> Dataset:
     """Read design points; one that failed is NaN."""
     source = load_text(path)
@@ -228,11 +236,7 @@ def read_design_points(path: str | os.PathLike[str]) -> Dataset:
             rows.append(ExportRow(line, tuple(cell or "nan" for cell in cells)))
     if not names:
         source.refuse("", "no header", "a line such as Name,P1,P2")
-    columns = []
-    for name in names:
-        words, unit = told.get(name) or _headed(name)
-        unit = unit or units.get(name, "")
-        columns.append(Column(words, si_unit(unit) or unit))
+    columns = [_column(name, told, units) for name in names]
     table = numeric_table(source, columns, rows, mark != ",")
     texts = {"name": tuple(labels)} if len(labels) == len(table.values) else {}
     about = {**source.about, "clock": "none"}

@@ -216,6 +216,25 @@ def read_pe0(path: str | os.PathLike[str]) -> ApcBlade:
     )  # fmt: skip
 
 
+def _per3_row(source: SourceText, index: int, width: int, rpm: float | None) -> tuple[float, ...]:
+    """One line as (rpm, columns...); empty where it is no row, which is a fault of the file."""
+    line = source.lines[index - 1]
+    tokens, rest = _TOKEN.findall(line), _TOKEN.sub("", line).strip()
+    if len(tokens) == 2 and rpm is not None:  # V and J of a point at which the code failed
+        tokens, rest = tokens + ["NaN"] * (width - 2), ""
+    if len(tokens) != width or rest:
+        expected = f"{width} numbers ({' '.join(_PER3_COLUMNS[:width])})"
+        source.add(index, repr(line.strip()[:60]), expected, "Repair or delete the row")
+    elif rpm is None:
+        source.add(index, "a row before any rpm", "PROP RPM = ... above it")
+    else:
+        values = [math.nan if v is None else v for v in map(number, tokens)]
+        if math.isnan(values[0]) or math.isnan(values[1]):
+            source.add(index, "no V or J", "numbers", "Repair or delete the row")
+        return (rpm, *values)
+    return ()
+
+
 def _per3_rows(source: SourceText) -> dict[int, tuple[float, ...]]:
     """Rows as (rpm, columns...) by their line; NaN where the file says so."""
     rpm: float | None = None
@@ -233,19 +252,8 @@ def _per3_rows(source: SourceText) -> dict[int, tuple[float, ...]]:
                 expected = f"{' '.join(_PER3_COLUMNS[:8])}, or 15 columns"
                 source.add(index, " ".join(words), expected, "An unknown form of this file")
         elif width and words and (words[0][0].isdigit() or words[0][0] in "+-.*"):
-            tokens, rest = _TOKEN.findall(line), _TOKEN.sub("", line).strip()
-            if len(tokens) == 2 and rpm is not None:  # V and J of a point at which the code failed
-                tokens, rest = tokens + ["NaN"] * (width - 2), ""
-            if len(tokens) != width or rest:
-                expected = f"{width} numbers ({' '.join(_PER3_COLUMNS[:width])})"
-                source.add(index, repr(line.strip()[:60]), expected, "Repair or delete the row")
-            elif rpm is None:
-                source.add(index, "a row before any rpm", "PROP RPM = ... above it")
-            else:
-                values = [math.nan if v is None else v for v in map(number, tokens)]
-                if math.isnan(values[0]) or math.isnan(values[1]):
-                    source.add(index, "no V or J", "numbers", "Repair or delete the row")
-                rows[index] = (rpm, *values)
+            if row := _per3_row(source, index, width, rpm):
+                rows[index] = row
     if not rows and not source.faults:
         source.add("", "no rows", "blocks under PROP RPM = ...", "Is the file cut off?")
     return rows

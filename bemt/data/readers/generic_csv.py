@@ -50,6 +50,12 @@ DOUBTFUL_RPM = 20000.0
 """Speed above which a column called rpm may count electrical revolutions."""
 
 
+def _full_lines(text: str) -> list[str]:
+    """Lines of a head that say something, but for the last one, which its end may cut."""
+    lines = [t for t in text.splitlines() if t.strip() and not is_comment(t)]
+    return lines[:-1] if len(text) >= 4096 and len(lines) > 2 else lines
+
+
 def sniff(head: bytes | str) -> bool:
     r"""Tell whether a text is a table with a column of numbers.
 
@@ -57,9 +63,7 @@ def sniff(head: bytes | str) -> bool:
     (True, False)
     """
     text = head_text(head)
-    lines = [t for t in text.splitlines() if t.strip() and not is_comment(t)]
-    if len(text) >= 4096 and len(lines) > 2:
-        lines = lines[:-1]  # the head may end in the middle of a line
+    lines = _full_lines(text)
     if len(lines) < 2 or lines[0].lstrip().startswith(("[", "{", "<", "!", "/*", "//")):
         return False
     lines = [t for t in lines if t.strip(" \t;,|")]
@@ -124,7 +128,7 @@ def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
         step = one_step(Path(build.table.source.name).as_posix(), options)
         build.warnings.append(f"no heading line: columns are numbered. With your own numbers and units: {step}")
     build.flag_time()
-    speeds = [n for n in build.channels if n == "rpm" or n.endswith("_rpm")]
+    speeds = [n for n in build.channels if n.rpartition("_")[2] == "rpm"]
     build.flag_speeds(*speeds)
     if "rpm" in speeds and np.nanmax(build.channels["rpm"].values, initial=0.0) > DOUBTFUL_RPM:
         build.warnings.append("rpm: the file does not say whether mechanical or electrical; taken as written")

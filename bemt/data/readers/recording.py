@@ -164,13 +164,17 @@ class Builder:
             out, k = f"{name}_{k}", k + 1
         return out
 
+    def _warn_of_sheet_errors(self, index: int, label: str) -> None:
+        if errors := sum(cell.lower() in SHEET_ERRORS for cell in self.table.cells(index)):
+            note = f"column {label!r}: {number_of(errors, 'cell')} with an error of the spreadsheet, taken as empty"
+            self.warnings.append(note)
+
     def add(self, index: int, head: Heading, sign: float = 1.0) -> str:
         """Add column `index` as a channel or a text; gives its name ("" when the column is empty)."""
         values, bad, empty = self.table.numbers(index, self.decimal)
         label, filled = head.text or f"column {index + 1}", len(values) - empty
-        if empty and (errors := sum(cell.lower() in SHEET_ERRORS for cell in self.table.cells(index))):
-            note = f"column {label!r}: {number_of(errors, 'cell')} with an error of the spreadsheet, taken as empty"
-            self.warnings.append(note)
+        if empty:
+            self._warn_of_sheet_errors(index, label)
         if not filled:
             self.empty.append(repr(label))
             return ""

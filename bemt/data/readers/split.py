@@ -341,6 +341,14 @@ def _used_lines(source: SourceText, lines: Sequence[str]) -> tuple[list[tuple[in
     return used, notes
 
 
+def _note_of(above: Sequence[tuple[int, str]]) -> list[str]:
+    """Note of the lines above the headings, unless they are Excel's word for the delimiter."""
+    if not above or _EXCEL.fullmatch(above[0][1]):
+        return []
+    shown = some((repr(t.strip()[:60]) for _, t in above), 3)
+    return [f"{number_of(len(above), 'line')} above the headings left out: {shown}"]
+
+
 def split_table(
     source: SourceText, delimiter: str | None = None, header: bool | None = None, most_misfits: float = MISFIT_SHARE
 ) -> SplitTable:
@@ -350,10 +358,7 @@ def split_table(
     start, mark = find_start([t for _, t in used[:60]]) if delimiter is None and header is not False else (0, delimiter)
     mark = mark or find_delimiter([t for _, t in used[:5]])
     above, used = tuple(used[:start]), used[start:]
-    labview = next((split_line(t, mark) for _, t in above if t.startswith("Y_Unit_Label")), [])
-    if above and not _EXCEL.fullmatch(above[0][1]):
-        shown = some((repr(t.strip()[:60]) for _, t in above), 3)
-        notes.append(f"{number_of(start, 'line')} above the headings left out: {shown}")
+    notes += _note_of(above)
     split = [(i, split_line(t, mark)) for i, t in used]
     if header is None and (said := _in_a_comment(lines, split, mark)):
         split.insert(0, said)
@@ -364,7 +369,7 @@ def split_table(
     header = not any(number(c) is not None for c in first) if header is None else header
     if header and len(split) > 1 and top == used[0][0]:
         first = heading_cells(used[0][1], mark, len(split[1][1]))
-    first = _of_labview(first, labview)
+    first = _of_labview(first, above, mark)
     closed = not lines[-1]
     names, body = _below(first, split, closed, notes) if header else ([], split)
     width = len(names) or max((len(c) for _, c in split[:2]), default=len(first))
@@ -379,8 +384,9 @@ def _with_units(names: Sequence[str], units_: Sequence[str]) -> list[str]:
     return [f"{name} ({unit})" if unit else name for name, unit in zip(names, filled, strict=False)]
 
 
-def _of_labview(names: list[str], labels: Sequence[str]) -> list[str]:
+def _of_labview(names: list[str], above: Sequence[tuple[int, str]], mark: str) -> list[str]:
     """Headings with the units of the channels, which stand behind the time; as they are without such a line."""
+    labels = next((split_line(t, mark) for _, t in above if t.startswith("Y_Unit_Label")), [])
     if not labels:
         return names
     first, *others = _with_units(names, [*["s"][: len(names)], *labels[1:]])

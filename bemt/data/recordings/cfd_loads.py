@@ -76,9 +76,18 @@ class OpenRun:
         outer = not any(DUCT.search(c.zone) for c in self.columns)
         return bool(DUCT.search(zone)) or (outer and "nacelle" in zone.lower())
 
+    def stands_still(self, zone: str) -> bool:
+        """Whether a zone is a part beside the rotor, such as a duct or a stator."""
+        return self.is_duct(zone) or bool(_STILL.search(zone))
+
     def fact(self, quantity: str) -> RunColumn:
         """What the user said of a quantity."""
         return getattr(self.run.columns, quantity) or RunColumn()
+
+    @property
+    def units_given(self) -> tuple[str, ...]:
+        """Loads whose unit the user stated: asked for where the files state none."""
+        return tuple(q for q in ("thrust", "torque") if self.fact(q).unit)
 
     def named(self, quantity: str) -> list[LoadColumn]:
         """Columns that may be a quantity: by the name that was given, by unit, or by the words of the heading."""
@@ -165,8 +174,7 @@ class OpenRun:
         slowest = float(V.min())
         at = {q: f.values[V == slowest] if V.size == f.values.size else f.values for q, f in loads.items()}
         size = {q: float(np.nan_to_num(middle(v))) for q, v in at.items()}
-        shaft = max((abs(size[q]) * (1.0 if q == "power" else float(np.median(rpm)) * math.pi / 30.0)
-                     for q in ("torque", "power") if q in loads), default=math.inf)  # fmt: skip
+        shaft = _shaft_power(size, float(np.median(rpm)))
         brakes = 0.0 < shaft < slowest * abs(size.get("thrust", 0.0))  # no pull gives more than its shaft
         out: dict[str, float] = {}
         for quantity, value in size.items():
@@ -255,6 +263,12 @@ class OpenRun:
                 got = f"--rpm {rpm:g}, where {c.name} has {', '.join(f'{x:g}' for x in v[:4])}"
                 usual = "Leave out --rpm" if stated else '--unit rpm=rpm, or --unit rpm="rad/s", says its unit'
                 return self.fault(c, c.name, got, "one source of the speed", usual)
+
+
+def _shaft_power(size: Mapping[str, float], rpm: float) -> float:
+    """Power of the shaft by torque and by power, the higher; infinite where neither is known. [W]"""
+    by = {"torque": rpm * math.pi / 30.0, "power": 1.0}
+    return max((abs(size[q]) * factor for q, factor in by.items() if q in size), default=math.inf)
 
 
 def _axis(run: OpenRun, forces: Sequence[LoadColumn], moments: Sequence[LoadColumn]) -> str:
@@ -365,18 +379,22 @@ def _stated_zones(run: OpenRun, quantity: str, pool: Mapping[str, LoadColumn], z
     return known
 
 
+def _as_told(run: OpenRun, told: Sequence[str], pool: Mapping[str, LoadColumn], zones: Sequence[str]) -> list[str]:
+    """Those of some zones that are stated to be on the shaft; a fault where one of them has no torque."""
+    if absent := [z for z in told if z not in pool]:
+        run.fault(None, "rotor_zones", ", ".join(absent), f"zones with a torque: {', '.join(zones)}")
+    return [z for z in zones if z in told]
+
+
 def _on_shaft(run: OpenRun, pool: Mapping[str, LoadColumn], zones: Sequence[str]) -> list[str]:
     """Those of some zones whose moment is the shaft's torque: as stated, else by name and by the sense of the moment.
 
     A duct and a stator stand still, and no zone on the shaft turns against the blades. A zone of unknown part counts
     where nothing stands still; beside parts that do, and where no name tells the blades, it is asked for.
     """
-    told = run.run.run.rotor_zones
-    if told is not None:
-        if absent := [z for z in told if z not in pool]:
-            run.fault(None, "rotor_zones", ", ".join(absent), f"zones with a torque: {', '.join(zones)}")
-        return [z for z in zones if z in told]
-    moment = {z: level(pool[z]) for z in zones if not (run.is_duct(z) or _STILL.search(z))}
+    if (told := run.run.run.rotor_zones) is not None:
+        return _as_told(run, told, pool, zones)
+    moment = {z: level(pool[z]) for z in zones if not run.stands_still(z)}
     named = [z for z in moment if TURNS.search(z)]
     whole = sum(moment[z] for z in named or moment)
     against = [z for z in moment if moment[z] * whole < 0.0]
@@ -387,7 +405,7 @@ def _on_shaft(run: OpenRun, pool: Mapping[str, LoadColumn], zones: Sequence[str]
     if len(moment) == len(zones) and not counts(against):
         return list(moment)
     shaft = named or sorted(moment, key=lambda z: -abs(moment[z]))[:1]
-    doubt = [z for z in moment if (z in shaft) == (z in against)] if named else [z for z in moment if z not in shaft]
+    doubt = [z for z in moment if (z in shaft) == (bool(named) and z in against)]
     if counts(doubt):
         got = "torque of " + ", ".join(f"{z} {m:+.4g}" for z, m in moment.items())
         hint = f"--rotor-zones {','.join(z for z in shaft if z not in doubt)}: those on one shaft; thrust counts all"

@@ -108,6 +108,18 @@ def _of_sign(text: str, by_column: Mapping[str | int, str]) -> tuple[Sequence[st
     return (quantity,) if mark else _LOADS[:1] + _LOADS[2:], int(value)
 
 
+def _add_signs(sign: Sequence[str], columns: dict[str, Facts], faults: list[Fault]) -> None:
+    """Add the stated signs to what is known of the quantities."""
+    by_column = {c["column"]: q for q, c in columns.items() if "column" in c}
+    for text in sign:
+        found = _of_sign(text, by_column)
+        if isinstance(found, Fault):
+            faults.append(found)
+        else:
+            for quantity in found[0]:
+                columns.setdefault(quantity, {})["sign"] = found[1]
+
+
 def run_from(
     files: Sequence[str], *, rpm: float | None = None, airspeed_m_s: float | None = None,
     density_kg_m3: float | None = None, revolutions: int | None = None, sector: int | None = None,
@@ -134,14 +146,7 @@ def run_from(
         else:
             zones = [*zones, *names]
     gather("--column", column, _of_column, columns, faults)
-    by_column = {c["column"]: q for q, c in columns.items() if "column" in c}
-    for text in sign:
-        found = _of_sign(text, by_column)
-        if isinstance(found, Fault):
-            faults.append(found)
-            continue
-        for quantity in found[0]:
-            columns.setdefault(quantity, {})["sign"] = found[1]
+    _add_signs(sign, columns, faults)
     head = {"files": tuple(files), "rpm": rpm, "airspeed_m_s": airspeed_m_s, "density_kg_m3": density_kg_m3,
             "revolutions": revolutions, "sector": sector, "axis": axis,
             "zones": tuple(_split(zones)) or None, "rotor_zones": tuple(_split(rotor_zones)) or None,

@@ -147,6 +147,13 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> CfdRun:
     return _dataset(work, found, read)
 
 
+def _without(columns: Sequence[LoadColumn], ignore: Sequence[str], name: str) -> tuple[list[LoadColumn], list[Fault]]:
+    """Columns but those to ignore; faults of names that none of run `name` has."""
+    known = dict.fromkeys(n for c in columns for n in (c.name, c.stem))
+    faults = [Fault(name, "ignore", repr(n), f"one of {', '.join(known)}") for n in ignore if n not in known]
+    return [c for c in columns if not {c.name, c.stem} & {*ignore}], faults
+
+
 def _opened(run: RunToml, folder: Path, name: str) -> tuple[OpenRun, list[tuple[str, Dataset]]]:
     """The files of a run as they were read, and their columns side by side."""
     files = [folder / f for f in run.run.files]
@@ -154,9 +161,8 @@ def _opened(run: RunToml, folder: Path, name: str) -> tuple[OpenRun, list[tuple[
     read, faults = read_run([f for f in files if f.name != WALLS or not walls])
     homes = {zone_of(Path(f), r.format) for f, r in read if any(n.startswith("force_") for n in r.values)}
     columns = [c for file, record in read for c in columns_of(file, record, len(homes) > 1)]
-    ignore, known = run.run.ignore or (), dict.fromkeys(n for c in columns for n in (c.name, c.stem))
-    faults = faults or [Fault(name, "ignore", repr(n), f"one of {', '.join(known)}") for n in ignore if n not in known]
-    columns = [c for c in columns if not {c.name, c.stem} & {*ignore}]
+    columns, unknown = _without(columns, run.run.ignore or (), name)
+    faults = faults or unknown
     told = {"restart": False, "joined": False, "left out": False, "rhoInf": bool(run.reference.density_kg_m3),
             "--sector": bool(run.run.sector)}  # fmt: skip
     notes = [n for _, r in read for n in r.notes if any(word in n and not said for word, said in told.items())]
@@ -267,6 +273,15 @@ class _Points:
     averaged: dict[str, str] = field(default_factory=dict)
     drift: dict[str, float] = field(default_factory=dict)
 
+    def whole(self, name: str) -> dict[str, Array]:
+        """Every channel with one value for each row of run `name`."""
+        sizes = {k: v.size for k, v in self.values.items()}
+        rows = max(sizes.values())
+        if {*sizes.values()} - {1, rows}:
+            got = ", ".join(f"{k} {size}" for k, size in sizes.items())
+            raise InputError(Fault(name, "", f"columns of unlike length ({got})", "files of one run"))
+        return {k: np.broadcast_to(v, (rows,)).copy() for k, v in self.values.items()}
+
 
 def _operating(work: OpenRun, rpm: Array) -> dict[str, Array]:
     """Operating point, as stated or from columns, and the cells of the grids."""
@@ -342,8 +357,9 @@ def _unused(work: OpenRun, values: Mapping[str, Array]) -> None:
     left = [n for n in left if channel_of(n) not in _KNOWN and not other_than_loads([n]) and _NAMED_LOAD.search(n)]
     if left:
         work.notes.insert(0, f"not used: {', '.join(dict.fromkeys(left))}; --column says what it is")
-    rest = [c for c in work.columns if _table(c.record) and c.name not in work.used and moves(c.record[c.name])]
-    if rest := [c for c in rest if channel_of(c.stem) not in _KNOWN]:
+    rest = [c for c in work.columns if _table(c.record) and c.name not in work.used
+            and channel_of(c.stem) not in _KNOWN and moves(c.record[c.name])]  # fmt: skip
+    if rest:
         _unread_rows(work, values, ", ".join(dict.fromkeys(c.name for c in rest)), len(rest[0].record))
 
 
@@ -370,6 +386,13 @@ def _coefficients(work: OpenRun, points: _Points) -> None:
                     points.u[name] = np.full(found.values.size, math.hypot(np.nan_to_num(found.drift), found.scatter))
 
 
+def _y_plus_of(walls: Mapping[str, tuple[float, float]]) -> dict[str, float | None]:
+    """Mean and highest y+ of the walls that turn, of all where no name tells them."""
+    told = [v for k, v in walls.items() if TURNS.search(k)] or list(walls.values())
+    means, most = ([v for v in column if math.isfinite(v)] for column in zip(*told, strict=True)) if told else ([], [])
+    return {"y_plus": float(np.mean(means)) if means else None, "y_plus_max": max(most, default=None)}
+
+
 def _conditions(
     work: OpenRun, read: Sequence[tuple[str, Dataset]], each: Array | None, drift: float | None
 ) -> dict[str, Any]:
@@ -382,9 +405,7 @@ def _conditions(
         "cells": float(each[0]) if each is not None and np.unique(each).size == 1 else cells,
         "steady": False if "time" in clocks else True if "iteration" in clocks else None, "thrust_from": "forces",
     }  # fmt: skip
-    fine = [v for k, v in work.walls.items() if TURNS.search(k)] or list(work.walls.values())
-    means, most = ([v for v in column if math.isfinite(v)] for column in zip(*fine, strict=True)) if fine else ([], [])
-    found |= {"y_plus": float(np.mean(means)) if means else None, "y_plus_max": max(most, default=None)}
+    found |= _y_plus_of(work.walls)
     more = {"drift_thrust": drift, "u_grid": _stated_grid(work).get("thrust_N")}
     return {k: v for part in (found, work.run.setup.given(), more) for k, v in part.items() if v is not None}
 
@@ -399,23 +420,18 @@ def _stated_grid(work: OpenRun) -> dict[str, float]:
 def _dataset(work: OpenRun, points: _Points, read: Sequence[tuple[str, Dataset]]) -> CfdRun:
     """Points of a run as a dataset: rows without a load left out, those of several grids as one study."""
     name, values, averaged, drift = work.name, points.values, points.averaged, points.drift
-    sizes = {k: v.size for k, v in values.items()}
-    rows = max(sizes.values())
-    if {*sizes.values()} - {1, rows}:
-        got = ", ".join(f"{k} {size}" for k, size in sizes.items())
-        raise InputError(Fault(name, "", f"columns of unlike length ({got})", "files of one run"))
-    whole = {k: np.broadcast_to(v, (rows,)).copy() for k, v in values.items()}
+    whole = points.whole(name)
     full = {k: v for k, v in whole.items() if k not in _GRIDS}
+    rows = max(map(len, whole.values()))
     conditions = _conditions(work, read, values.get("cells"), drift.get("thrust_N"))
     labels = next((tuple(r.texts["name"]) for _, r in read if len(r.texts.get("name", ())) == rows), ())
     sha256 = "+".join(r.sha256 for _, r in read)
     about: dict[str, Any] = {"file": name, "format": "cfd_run", "sha256": sha256}
     if rows == 1:
         about["means"] = {k: Mean(float(full[k][0]), over, drift.get(k)) for k, over in averaged.items()}
-    given = tuple(q for q in ("thrust", "torque") if work.fact(q).unit)  # asked for where the files state none
     made = CfdRun("cfd", Path(name).name, full, {k: np.broadcast_to(v, (rows,)) for k, v in points.u.items()}, (),
                   about, labels, notes=tuple(dict.fromkeys(work.notes)), files=tuple(work.run.run.files),
-                  conditions=conditions, averaged=averaged, drift=drift, units_given=given, zones=work.zones,
+                  conditions=conditions, averaged=averaged, drift=drift, units_given=work.units_given, zones=work.zones,
                   elsewhere=tuple(work.elsewhere), unread=work.unread)  # fmt: skip
     keep = np.any([np.isfinite(v) for k, v in full.items() if k not in _POINT], axis=0)
     if not keep.all():

@@ -74,6 +74,16 @@ def _get(url: str, target: Path, progress: Progress | None) -> None:
         raise InputError(Fault(url, "", f"{have} of {total} bytes", "the whole file", "Run the command again"))
 
 
+def _unsafe(info: zipfile.ZipInfo) -> tuple[str, str] | None:
+    """What must not be unpacked of an archive, and what would do."""
+    path = PurePosixPath(info.filename)
+    if "\\" in info.filename or path.is_absolute() or ".." in path.parts or any(":" in part for part in path.parts):
+        return "a path that leaves the folder", "a relative path"
+    if stat.S_ISLNK(info.external_attr >> 16):
+        return "a link", "files only"
+    return ("an encrypted file", "plain files") if info.flag_bits & 0x1 else None
+
+
 def _members(archive: zipfile.ZipFile, name: str) -> list[tuple[zipfile.ZipInfo, PurePosixPath]]:
     """Files of an archive with the places they may take; all faults at once."""
     faults: list[Fault] = []
@@ -85,12 +95,8 @@ def _members(archive: zipfile.ZipFile, name: str) -> list[tuple[zipfile.ZipInfo,
     for info in infos:
         path = PurePosixPath(info.filename)
         parts = path.parts
-        if "\\" in info.filename or path.is_absolute() or ".." in parts or any(":" in part for part in parts):
-            faults.append(Fault(name, info.filename, "a path that leaves the folder", "a relative path"))
-        elif stat.S_ISLNK(info.external_attr >> 16):
-            faults.append(Fault(name, info.filename, "a link", "files only"))
-        elif info.flag_bits & 0x1:
-            faults.append(Fault(name, info.filename, "an encrypted file", "plain files"))
+        if unsafe := _unsafe(info):
+            faults.append(Fault(name, info.filename, *unsafe))
         elif not info.is_dir() and "__MACOSX" not in parts and not any(part.startswith(".") for part in parts):
             if str(path).lower() in seen:
                 faults.append(Fault(name, info.filename, "a second file of this name", "one"))

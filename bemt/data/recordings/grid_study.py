@@ -93,6 +93,15 @@ def _order(e21: float, e32: float, r21: float, r32: float) -> float | None:
     return 0.5 * (low + high)
 
 
+def _refuse_unfit(f: Sequence[float], r: Sequence[float]) -> None:
+    """Refuse values and ratios that no study can use."""
+    if not (np.all(np.isfinite(f)) and np.all(f[:2])):
+        raise InputError(Fault("", "values", ", ".join(f"{v:g}" for v in f), "finite values other than zero"))
+    if not all(1.0 < v < math.inf for v in r):
+        hint = "List the finest grid first; a ratio is coarse over fine cell size"
+        raise InputError(Fault("", "ratios", ", ".join(f"{v:g}" for v in r), "numbers above 1", hint))
+
+
 def grid_study(values: Sequence[float], ratios: Sequence[float], formal_order: float = 2.0) -> GridStudy:
     """Estimate the discretization error of a value on two or three grids.
 
@@ -103,11 +112,7 @@ def grid_study(values: Sequence[float], ratios: Sequence[float], formal_order: f
     0.24
     """
     f, r = tuple(float(v) for v in values), tuple(float(v) for v in ratios)
-    if not (np.all(np.isfinite(f)) and np.all(f[:2])):
-        raise InputError(Fault("", "values", ", ".join(f"{v:g}" for v in f), "finite values other than zero"))
-    if not all(1.0 < v < math.inf for v in r):
-        hint = "List the finest grid first; a ratio is coarse over fine cell size"
-        raise InputError(Fault("", "ratios", ", ".join(f"{v:g}" for v in r), "numbers above 1", hint))
+    _refuse_unfit(f, r)
     flags = [f"ratio {v:.3g} below {MIN_RATIO}: the index is uncertain" for v in r if v < MIN_RATIO - 1e-9]
     fs = {3: FS_THREE, 2: FS_TWO}[len(f)]
     e21, spread = f[1] - f[0], (max(f) - min(f)) / abs(f[0])

@@ -138,8 +138,9 @@ def by_grid(d: CfdRun, cells: Array, size_unit: str | None = None) -> CfdRun:
     keep: list[int] = []
     studies: list[LoadStudy] = []
     sizes: dict[str, Array] = {k: np.full(len(d), np.nan) for k in LOADS if k in d}
+    coarseness = np.where(np.isfinite(cells), -cells, 1.0)
     for group in groups(d):
-        order = sorted(group, key=lambda i: -cells[i] if math.isfinite(cells[i]) else 1.0)
+        order = sorted(group, key=coarseness.__getitem__)
         keep.append(order[0])
         if len(group) > 1:
             _are_unlike(d, group, cells, size_unit)
@@ -295,8 +296,8 @@ def of_table(record: Dataset) -> Dataset:
     Rows of one condition on several grids are no repeats; rows of unlike conditions on one grid owe what a grid costs
     elsewhere, in a table of speeds and loads. A table that states its uncertainties keeps its rows.
     """
-    counted = next((k for k in record.values if CELLS.search(k)), None)
-    column = counted or next((k for k in record.values if CELL_SIZE.fullmatch(k)), None)
+    counted = next(filter(CELLS.search, record.values), None)
+    column = counted or next(filter(CELL_SIZE.fullmatch, record.values), None)
     d = named(record)
     loads = [k for k in LOADS if k in d]
     if column is None or not loads or any(np.isfinite(d.u[k]).any() for k in loads):

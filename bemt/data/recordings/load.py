@@ -107,6 +107,15 @@ def _unsettled(record: Dataset) -> list[str]:
     return [f"not settled (drift over the averaged part): {some(moving, 6)}"] if moving else []
 
 
+def _of_no_run(names: list[str], runs: Sequence[Dataset], to_do: str | None) -> list[str]:
+    """Files and folders that no run, read or still asked for, stands for."""
+    if not (runs or to_do):
+        return names
+    whole = {f for d in runs for f in d.files}
+    return [n for n in names if not (Path(n).is_dir() and cfd_files(Path(n)))
+            and not (Path(n).name == WALLS and (to_do or n in whole))]  # fmt: skip
+
+
 def import_files(
     paths: Iterable[str | os.PathLike[str]], format: str | None = None, choice: Choice | None = None,  # noqa: A002
     run: RunToml | None = None, insist: bool = False, stated: Mapping[str, Dataset] = {},  # noqa: B006
@@ -118,10 +127,7 @@ def import_files(
     """
     names = [os.fspath(path) for path in paths]
     runs, to_do = runs_of(names, run, insist)
-    if runs or to_do:
-        whole = {f for d in runs for f in d.files}
-        names = [n for n in names if not (Path(n).is_dir() and cfd_files(Path(n)))
-                 and not (Path(n).name == WALLS and (to_do or n in whole))]  # fmt: skip
+    names = _of_no_run(names, runs, to_do)
     records: dict[str, Dataset] = {}
     errors: dict[str, str] = {}
     for name in names:

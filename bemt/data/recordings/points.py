@@ -95,6 +95,19 @@ def _stairs(rec: Dataset) -> bool:
     return all(not np.nanmedian(np.abs(h)) > STEADY * np.nanmax(np.abs(v)) for h, v in zip(halves, told, strict=True))
 
 
+def _by_step(step: float, rows: int, commanded: bool, held: bool) -> tuple[bool, str]:
+    """Decide by the median time step [s], and by a command, if there is one, that is held or changes."""
+    words = f"the median time step is {step:.3g} s"
+    if step <= (FAST_S if commanded else MIDDLE_S):
+        return True, f"rows are samples: {words}"
+    if step <= SLOW_S and held:
+        return True, f"rows are samples: {words} and the command is held"
+    if rows > LOG:
+        return True, f"rows are samples: more than {LOG}"
+    more = ", and the command changes" if commanded and not held else ""
+    return False, f"rows are points: {words}{more}" + (" (a slow ramp: quasi-steady)" if step <= MIDDLE_S else "")
+
+
 def is_samples(rec: Dataset) -> tuple[bool, str]:
     """Decide what the rows are."""
     if stated(rec):
@@ -108,16 +121,7 @@ def is_samples(rec: Dataset) -> tuple[bool, str]:
     t = rec.values.get("time_s")
     t = t[np.isfinite(t)] if t is not None else None
     if t is not None and len(t) > 0.5 * len(rec):
-        step = float(np.median(np.abs(np.diff(t))))
-        words = f"the median time step is {step:.3g} s"
-        if step <= (FAST_S if found is not None else MIDDLE_S):
-            return True, f"rows are samples: {words}"
-        if step <= SLOW_S and held:
-            return True, f"rows are samples: {words} and the command is held"
-        if len(rec) > LOG:
-            return True, f"rows are samples: more than {LOG}"
-        more = "" if found is None else ", and the command changes" if not held else ""
-        return False, f"rows are points: {words}{more}" + (" (a slow ramp: quasi-steady)" if step <= MIDDLE_S else "")
+        return _by_step(float(np.median(np.abs(np.diff(t)))), len(rec), found is not None, held)
     if held:
         return True, "rows are samples: no time, but the command is held over many rows"
     if t is None and found is None and _stairs(rec):

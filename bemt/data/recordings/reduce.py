@@ -70,6 +70,18 @@ def reduction(points: Dataset) -> Reduction:
     return how
 
 
+def _no_load(recording: Dataset) -> Fault:
+    """Fault of a recording without a load, with what would make one of its columns a load."""
+    got = "no thrust, torque, power, current or coefficient with a unit"
+    got += f"; columns {some(map(repr, recording.headings.values()), 12)}" * bool(recording.headings)
+    hint = "Name units in the headings or in a recording.toml" + in_one_step(recording)
+    if recording.kind == "flight":
+        hint = "Nothing on board weighs the thrust: give a table with thrust_N, mass times acceleration per propeller"
+    elif near := [fix for q, (_, _, fix) in asks(recording).items() if q in ("thrust", "torque")]:
+        hint = "; ".join([near[0][0].upper() + near[0][1:], *near[1:]])
+    return Fault(recording.file or recording.name, "", got, "one of them", hint)
+
+
 @np.errstate(all="ignore")  # a damaged file may hold any number; what is not finite becomes NaN or a refusal
 def reduce(recording: Dataset, *, diameter_m: float | None = None, steady: bool | None = None) -> Dataset:
     """Reduce a recording to steady points: kind ``bench``, uncertainties the uncorrelated part, `reduction` of them.
@@ -82,16 +94,7 @@ def reduce(recording: Dataset, *, diameter_m: float | None = None, steady: bool 
     name, constants = recording.file or recording.name, recording.constants
     rec = _trusted(named(recording))
     if not set(LOADS) & rec.values.keys():
-        got = "no thrust, torque, power, current or coefficient with a unit"
-        hint = "Name units in the headings or in a recording.toml" + in_one_step(recording)
-        if near := [fix for q, (_, _, fix) in asks(recording).items() if q in ("thrust", "torque")]:
-            hint = "; ".join([near[0][0].upper() + near[0][1:], *near[1:]])
-        got += f"; columns {some(map(repr, recording.headings.values()), 12)}" * bool(recording.headings)
-        if recording.kind == "flight":
-            hint = (
-                "Nothing on board weighs the thrust: give a table with thrust_N, mass times acceleration per propeller"
-            )
-        raise InputError(Fault(name, "", got, "one of them", hint))
+        raise InputError(_no_load(recording))
     samples, reason = not steady, f"rows are taken as {'points' if steady else 'samples'}"
     if steady is None:
         samples, reason = is_samples(rec)
@@ -261,6 +264,15 @@ def _fill_scatter(
             notes.append(f"{words} ({number_of(between.runs, 'run')}, {number_of(between.pairs, 'common point')})")
 
 
+def _with_power(series: Dataset) -> Dataset:
+    """With the power of the shaft by torque and speed, which needs no diameter."""
+    if "power_W" in series or not {"torque_Nm", "rpm"} <= series.values.keys():
+        return series
+    made = series.derive(1.0, np.full(len(series), np.nan))
+    return replace(series, values={**series.values, "power_W": made["power_W"]},
+                   u={**series.u, "power_W": made.u["power_W"]})  # fmt: skip
+
+
 def _series(
     recording: Dataset, found: Found, rec: Dataset, values: Mapping[str, Array], u: Mapping[str, Array],
     air: AirOfPoints, diameter: float | None,
@@ -280,11 +292,7 @@ def _series(
     series = Dataset("bench", str(said.get("run_name", short)), shown, {k: v for k, v in u.items() if k in shown},
                     tuple(p.flags for p in found.points), provenance, tuple(labels))  # fmt: skip
     if diameter is None:
-        if {"torque_Nm", "rpm"} <= shown.keys() and "power_W" not in shown:
-            series = series.derive(1.0, np.full(len(series), np.nan))
-            keep = [k for k in series.values if k in shown or k == "power_W"]
-            series = replace(series, values={k: series[k] for k in keep}, u={k: series.u[k] for k in keep})
-        return series
+        return _with_power(series)
     series = series.derive(diameter, air.rho if np.any(np.isfinite(air.rho)) else None)
     return _numbers(series, air, diameter)
 

@@ -45,14 +45,15 @@ MOST = 40
 """Points shown; JSON has all."""
 
 
-def options_of(told: Mapping[str, Sequence[str | float]]) -> list[str]:
-    """Words of options, of those that were told, quoted for a shell.
+def options_of(told: Mapping[str, Sequence[str | float]], *only: str) -> list[str]:
+    """Words of options, of those (`only`) that were told, quoted for a shell.
 
     >>> options_of({"rpm": [6000.0], "only": [], "column": ["thrust=load cell"]})
     ['--rpm', '6000', '--column', "'thrust=load cell'"]
     """
-    words = {f"--{name}": [shlex.quote(v if isinstance(v, str) else f"{v:g}") for v in told[name]] for name in told}
-    return [word for option, values in words.items() if values for word in (option, *values)]
+    words = {name: [shlex.quote(v if isinstance(v, str) else f"{v:g}") for v in told[name]] for name in told}
+    return [word for name, values in words.items() if values and name in (only or told)
+            for word in (f"--{name}", *values)]  # fmt: skip
 
 
 def reduction_document(reduced: Dataset | str | None) -> dict[str, Any] | None:
@@ -276,8 +277,8 @@ class Imported:
     def text(self, wrote: str = "", said: Mapping[str, Sequence[str | float]] = {}) -> str:  # noqa: B006
         """For a terminal, with what to do next with recordings of a rotor, of which the options `said` were given."""
         own = {name for run in self.runs for name in run.files}
-        shown = [f for f in self.files if f.format != RUN and f.error is None]
-        lines = [f.title if f.path in own else f.text + "\n" for f in shown]
+        lines = [f.title if f.path in own else f.text + "\n" for f in self.files
+                 if f.format != RUN and f.error is None]  # fmt: skip
         grids = {name for run in self.runs if run.studies for name in run.files if name != run.file}  # of its study
         lines += [run_text(run) + "\n" for run in self.runs if run.file not in grids]
         if self.to_do and self.files:
@@ -297,21 +298,26 @@ class Imported:
         said = said if file == name else {"case": said["case"]}
         return f"{lead}Next: bemt compare {' '.join([shlex.quote(file), *options_of(said)])}{_a_case(said)}\n"
 
+    @property
+    def _turned(self) -> list[str]:
+        """Quantities whose sign is flipped in every file."""
+        flips = [{USUAL.get(g.channel, g.channel).rsplit("_", 1)[0] for g in f.findings
+                  if g.id == "sign_flipped" and g.severity == "warning"} for f in self.files]  # fmt: skip
+        return sorted(set[str]().union(*flips).intersection(*flips))
+
     def _next_with_recordings(self, said: Mapping[str, Sequence[str | float]]) -> list[str]:
         """What to do with recordings of loads, if they have the speed; first what states a load that was not read."""
         if steps := [f.step for f in self.files if f.step]:
             step, *own = steps[0].partition("   (")
-            of_run = options_of({k: v for k, v in said.items() if k in ("rpm", "airspeed-m-s", "density-kg-m3")})
+            of_run = options_of(said, "rpm", "airspeed-m-s", "density-kg-m3")
             return [f"Next: {' '.join([step, *of_run])}{''.join(own)}\n"]
-        flips = [{USUAL.get(g.channel, g.channel).rsplit("_", 1)[0] for g in f.findings
-                  if g.id == "sign_flipped" and g.severity == "warning"} for f in self.files]  # fmt: skip
-        if turned := sorted(set[str]().union(*flips).intersection(*flips)):
-            said = {**said, "sign": [*said.get("sign", ()), *(f"{quantity}=-1" for quantity in turned)]}
+        if turned := [f"{quantity}=-1" for quantity in self._turned]:
+            said = {**said, "sign": [*said.get("sign", ()), *turned]}
         read = [(shlex.quote(f.path), f.record.kind, set(named(f.record).values)) for f in self.files if f.record]
         read = [(path, kind, known) for path, kind, known in read if _LOADS & known]
         loaded = [path for path, _, known in read if "rpm" in {*known, *said}]
         alone = [path for path, kind, _ in read if kind == "bench"]
-        how = options_of({k: v for k, v in said.items() if k in ("unit", "column", "sign")})
+        how = options_of(said, "unit", "column", "sign")
         if alone and not loaded:
             pair = " ".join(["bemt compare", *(alone if len(alone) == 2 else [alone[0], "ANOTHER_RUN"]), *how])
             return [f"Next: {pair}   (beside a model: a column headed rpm, the speed of every row)\n"]

@@ -70,6 +70,11 @@ class Relation:
         """Whether most rows are outside the bounds: a slip of a unit moves all rows alike, a poor sensor does not."""
         return self.range_low > self.high or self.range_high < self.low
 
+    @property
+    def due(self) -> str:
+        """What it must be, in words."""
+        return f"{self.centre:g}" if self.exact else f"{self.low:g} to {self.high:g}"
+
     def holds(self, shift: Mapping[str, float]) -> bool:
         """Whether it is inside its bounds after `shift`."""
         return self.low <= self.after(shift) <= self.high
@@ -267,23 +272,19 @@ def _repairs(known: list[Relation], facts: Facts) -> list[tuple[float, Slip]]:
 @check_for("slips")
 def find_slips(facts: Facts) -> Iterator[Finding]:
     """Name the slip of a unit that repairs what does not fit together."""
+    if facts.bare:
+        return
     facts = facts.sampled()
-    known = relations(facts) if not facts.bare else []
+    known = relations(facts)
     broken = [r for r in known if r.broken]
-    share = _electrical(facts, broken) if not facts.bare else None
+    share = _electrical(facts, broken)
     if not broken and share is None:
         return
     fits = _repairs(known, facts)
     if share is not None:
-        text = f"torque x speed is {share[1]:.3g} of it ({share[0]:.3g} to {share[2]:.3g} under load), "
-        text += "as the efficiency of a motor would be"
-        fix = "is it electrical power? Then name the column electrical_power_W"
-        if fits:
-            fix += f". If it is power of the shaft: {_told(fits[0][1].quantity, facts)}: {fits[0][1].words}"
-        yield Finding("power_electrical", facts.named("power_W"), text, fix, (), "warning")
+        yield _power_electrical(share, [slip for _, slip in fits[:1]], facts)
         return
-    must = [f"{r.centre:g}" if r.exact else f"{r.low:g} to {r.high:g}" for r in broken[:4]]
-    evidence = "; ".join(f"{r.name} is {r.value:.4g}, must be {m}" for r, m in zip(broken, must, strict=False))
+    evidence = "; ".join(f"{r.name} is {r.value:.4g}, must be {r.due}" for r in broken[:4])
     certain = any(r.exact for r in broken)
     if not fits:
         channels = sorted({_told(q, facts) for r in broken for q in r.powers if q in _QUANTITY or q == "D"})
@@ -296,6 +297,16 @@ def find_slips(facts: Facts) -> Iterator[Finding]:
     if others:
         words += ". Fits as well: " + "; ".join(_listed(others, facts))
     yield Finding(slip.id, _told(slip.quantity, facts), evidence, words, (), "error" if certain else "warning")
+
+
+def _power_electrical(share: tuple[float, float, float], slips: Sequence[Slip], facts: Facts) -> Finding:
+    """A power of which that of the shaft is a share; `slips` name what it would be as power of the shaft."""
+    low, middle, high = share
+    text = f"torque x speed is {middle:.3g} of it ({low:.3g} to {high:.3g} under load), "
+    fix = "is it electrical power? Then name the column electrical_power_W"
+    fix += "".join(f". If it is power of the shaft: {_told(s.quantity, facts)}: {s.words}" for s in slips)
+    text += "as the efficiency of a motor would be"
+    return Finding("power_electrical", facts.named("power_W"), text, fix, (), "warning")
 
 
 def _electrical(facts: Facts, broken: list[Relation]) -> tuple[float, float, float] | None:

@@ -37,6 +37,14 @@ def _unit(quantity: str, text: str) -> str | None:
     return found[0].suffix if found and found[0].suffix in units.UNITS else None
 
 
+def _units_of(name: str) -> str:
+    """Units that a quantity or a heading may have; those of the first quantities where it has no meaning."""
+    wanted = [d for q in (meanings(name) or [name]) if (d := CHANNELS.get(q))]
+    choice = ", ".join(u for d in dict.fromkeys(wanted) for u in units.suffixes(d))
+    every = "; ".join(f"{q} {', '.join(units.suffixes(d))}" for q, d in list(CHANNELS.items())[:8])
+    return choice or f"a unit of a quantity: {every}"
+
+
 @dataclass(frozen=True)
 class _Measured:
     """Headings of a table of measurements: what an option says of them is a quantity with facts, or a fault."""
@@ -67,11 +75,7 @@ class _Measured:
         quantity = quantity or next((q for q in (*meanings(name), *_BY_UNIT) if _unit(q, text)), None)
         told = None if quantity is None else _unit(quantity, text)
         if quantity is None or told is None:
-            wanted = [d for q in (meanings(name) or [name]) if (d := CHANNELS.get(q))]
-            choice = ", ".join(u for d in dict.fromkeys(wanted) for u in units.suffixes(d))
-            every = "; ".join(f"{q} {', '.join(units.suffixes(d))}" for q, d in list(CHANNELS.items())[:8])
-            hint = TWO_MEANINGS.get(text, "").capitalize()
-            return Fault("", "--unit", f"{name}={text}", choice or f"a unit of a quantity: {every}", hint)
+            return Fault("", "--unit", f"{name}={text}", _units_of(name), TWO_MEANINGS.get(text, "").capitalize())
         facts: Facts = {"unit": told}
         return quantity, facts | ({"column": name} if name in self.known else {})
 

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.action import worded
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError, refuse
+from bemt.base.errors import Fault, refuse
 from bemt.base.tables import number_of
 from bemt.physics import coefficients as co
 from bemt.physics.dataset.channels import KINDS, ORIGINS, channel_fault, unit_in
@@ -167,9 +167,7 @@ class Dataset:
         for key in values.keys() - u.keys():
             if each := [part[key] for part in u_by.values() if key in part]:
                 u[key] = _frozen(np.sqrt(np.sum(np.square(each), axis=0)))
-        if found:
-            file = self.file or self.name
-            raise InputError([Fault(file, *fault) for fault in found])
+        refuse(Fault(self.file or self.name, *fault) for fault in found)
         unknown = np.broadcast_to(_UNKNOWN, (n,))
         object.__setattr__(self, "values", MappingProxyType(values))
         object.__setattr__(self, "u", MappingProxyType({key: u.get(key, unknown) for key in values}))

@@ -94,20 +94,23 @@ COLUMNS = ("case", "rev/min", "tip Mach", "BEMT [N]", "u [N]", "BEMT torque [N m
            "own CFD [N]", "bench [N]", "vendor [N]", "BEMT − CFD [%]", "K1/K2 − CFD [%]", "agreement")  # fmt: skip
 
 
+def _comparison(page: CasePage, key: str) -> list[Cell]:
+    """Row of a case, with all of `COLUMNS`."""
+    kind, word, _ = page_verdict(page)
+    v = {source: items[0][1:] for source, items in _values(page).items()}
+    own = lead(page.result)
+    T, simple, cfd = (v.get(source, (None,))[0] for source in ("bemt", "k1k2", "cfd"))
+    off = [100 * (x / cfd - 1) if x is not None and cfd else None for x in (T, simple)]
+    return [
+        Cell(page.result.name, link=key), num(own and own.rpm, 6), num(own and own.M_tip, 3), num(T),
+        num(v.get("bemt", (0, None))[1], 2), num(own and own.torque_Nm), num(simple), num(cfd),
+        *(num(v.get(source, (None,))[0]) for source in ("openfoam", "bench", "vendor")),
+        *(num(x, signed=True) for x in off), Cell(word, badge=kind),
+    ]  # fmt: skip
+
+
 def _comparison_table(book: Book, ids: Sequence[str]) -> PageTable | None:
-    rows = []
-    for page, key in zip(book.cases, ids, strict=True):
-        kind, word, _ = page_verdict(page)
-        v = {source: items[0][1:] for source, items in _values(page).items()}
-        own = lead(page.result)
-        T, simple, cfd = (v.get(source, (None,))[0] for source in ("bemt", "k1k2", "cfd"))
-        off = [100 * (x / cfd - 1) if x is not None and cfd else None for x in (T, simple)]
-        rows.append([
-            Cell(page.result.name, link=key), num(own and own.rpm, 6), num(own and own.M_tip, 3), num(T),
-            num(v.get("bemt", (0, None))[1], 2), num(own and own.torque_Nm), num(simple), num(cfd),
-            *(num(v.get(source, (None,))[0]) for source in ("openfoam", "bench", "vendor")),
-            *(num(x, signed=True) for x in off), Cell(word, badge=kind),
-        ])  # fmt: skip
+    rows = [_comparison(page, key) for page, key in zip(book.cases, ids, strict=True)]
     if all(row[k].value is None for row in rows for k in (3, *range(6, 11))):
         return None
     used = [k for k in range(len(COLUMNS)) if k < 4 or any(not r[k].number or r[k].value is not None for r in rows)]

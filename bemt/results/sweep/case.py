@@ -31,7 +31,7 @@ from bemt.results.sweep.rows import (
     Stated,
 )
 from bemt.rotors.case import Case
-from bemt.rotors.case.propagate import BANDED, Moved, Points, prepared, propagate, vary
+from bemt.rotors.case.propagate import BANDED, Moved, Points, Propagated, prepared, propagate, vary
 from bemt.rotors.validity import serious
 
 if TYPE_CHECKING:
@@ -130,6 +130,24 @@ def _formula(case: Case, at: Points) -> tuple[Dataset, Dataset]:
     return simple, Dataset("k1k2", case.name, nominal, flags=simple.flags, u_by=parts)
 
 
+def _bemt_row(case: Case, found: Propagated, i: int, state: Mapping[str, float]) -> Row:
+    """Row of the rotor's own model at point `i`."""
+    nominal, nan = found.points, math.nan
+    runs = [nominal.thrust_N[i], *(run["thrust_N"][i] for one in found.moved for run in one.runs)]
+    return _row(
+        "bemt", "bemt", nominal.thrust_N[i], torque_Nm=nominal.torque_Nm[i], power_W=nominal.power_W[i],
+        CT=nominal.CT[i], CP=nominal.CP[i], u=nominal.u_thrust_N[i],
+        u_num=_part(nominal, "numerics", "thrust_N", i), u_input=_part(nominal, "input", "thrust_N", i),
+        u_model=_part(nominal, "model", "thrust_N", i), thrust_N_range=(np.fmin.reduce(runs), np.fmax.reduce(runs)),
+        exhaust_speed_m_s=nominal.exhaust_speed_m_s[i] if case.ducted else nan,
+        duct_share=nominal.duct_share[i] if case.ducted else nan, converged=bool(nominal.converged[i]),
+        H_force_N=nominal.H_force_N[i] if "H_force_N" in nominal else nan,
+        upper_thrust_N=nominal.upper_thrust_N[i] if case.paired else nan,
+        lower_thrust_N=nominal.lower_thrust_N[i] if case.paired else nan,
+        J=nominal.J[i], flags=tuple(nominal.flags[i]), **state,
+    )  # fmt: skip
+
+
 def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str], None] | None = None) -> Result:
     """Solve one case at its operating points and put everything recorded beside it."""
     computed = _runs(case)
@@ -151,23 +169,10 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
     for i, (w, v, rho) in enumerate(points):
         state = {"rpm": w, "airspeed_m_s": v, "density_kg_m3": rho, "M_tip": nominal.M_tip[i], "Re": nominal.Re75[i],
                  "angle_deg": case.angle_deg}  # fmt: skip
-        runs = [nominal.thrust_N[i], *(run["thrust_N"][i] for one in found.moved for run in one.runs)]
-        nan = math.nan
-        rows.append(_row(
-            "bemt", "bemt", nominal.thrust_N[i], torque_Nm=nominal.torque_Nm[i], power_W=nominal.power_W[i],
-            CT=nominal.CT[i], CP=nominal.CP[i], u=nominal.u_thrust_N[i],
-            u_num=_part(nominal, "numerics", "thrust_N", i), u_input=_part(nominal, "input", "thrust_N", i),
-            u_model=_part(nominal, "model", "thrust_N", i), thrust_N_range=(np.fmin.reduce(runs), np.fmax.reduce(runs)),
-            exhaust_speed_m_s=nominal.exhaust_speed_m_s[i] if case.ducted else nan,
-            duct_share=nominal.duct_share[i] if case.ducted else nan, converged=bool(nominal.converged[i]),
-            H_force_N=nominal.H_force_N[i] if "H_force_N" in nominal else nan,
-            upper_thrust_N=nominal.upper_thrust_N[i] if case.paired else nan,
-            lower_thrust_N=nominal.lower_thrust_N[i] if case.paired else nan,
-            J=nominal.J[i], flags=tuple(nominal.flags[i]), **state,
-        ))  # fmt: skip
+        rows.append(_bemt_row(case, found, i, state))
         rows.append(_row(
             "k1k2", "k1k2", simple.thrust_N[i], CT=simple.CT[i], u=simple.u_thrust_N[i], J=simple.J[i],
-            u_input=_part(fit, "input", "thrust_N", i), flags=tuple(simple.flags[i]), **(state | {"Re": nan}),
+            u_input=_part(fit, "input", "thrust_N", i), flags=tuple(simple.flags[i]), **(state | {"Re": math.nan}),
         ))  # fmt: skip
         if less is not None:
             variants.append(_row(

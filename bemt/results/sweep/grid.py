@@ -246,6 +246,16 @@ def _merge(statistics: list[Statistics]) -> Statistics:
     return Statistics(sum(s.points for s in statistics), sum(s.unconverged for s in statistics), *ends)
 
 
+def _parts(folder: Path, fingerprint: str, resume: bool) -> Path:
+    """Folder of the chunks, with those that are solved to `resume`; those of another grid are removed."""
+    parts = folder / f"grid.parts-{fingerprint[:16]}-csv"
+    for old in folder.glob("grid.parts-*"):
+        if old != parts or not resume:
+            shutil.rmtree(old)
+    parts.mkdir(parents=True, exist_ok=True)
+    return parts
+
+
 def run_grid(
     case: Case, folder: Path | None, fingerprint: str, threads: int = 1,
     progress: Callable[[int, int], None] | None = None, resume: bool = True, engine: Engine | None = None,
@@ -254,12 +264,7 @@ def run_grid(
     grid = Grid.of(case)
     if grid is None:
         return None
-    parts = None if folder is None else folder / f"grid.parts-{fingerprint[:16]}-csv"
-    if folder is not None and parts is not None:
-        for old in folder.glob("grid.parts-*"):
-            if old != parts or not resume:
-                shutil.rmtree(old)
-        parts.mkdir(parents=True, exist_ok=True)
+    parts = None if folder is None else _parts(folder, fingerprint, resume)
     statistics: dict[int, Statistics] = {}
     done = 0
 

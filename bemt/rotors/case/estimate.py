@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -117,14 +117,7 @@ def _of_label(
     measured_pitch_in: float | None, series: str | None, density: float | None, reading: str | None,
 ) -> RotorEstimate:  # fmt: skip
     told, faults = _label(label, blades)
-    lengths = (("--chord-mm", chord_mm, "mm", "chord"), ("--measured-pitch-in", measured_pitch_in, "in", "pitch"))
-    for option, value, unit, name in lengths:
-        if value is None:
-            continue
-        if not math.isfinite(value):
-            faults.append(Fault(option, "", f"{value:g}", f"a length [{unit}]"))
-        elif told:
-            faults += length_fault(option, value, unit, told.diameter_in * INCH, POSSIBLE[name])
+    faults += _length_faults(told, chord_mm, measured_pitch_in)
     if density is not None and not DENSITY[0] <= density <= DENSITY[1]:
         hint = "In g/m3? Divide by 1000" if 10.0 < density < 2000.0 else ""
         faults.append(Fault("--density-kg-m3", "", f"{density:g}", "0.01 to 10 kg/m3", hint))
@@ -174,6 +167,16 @@ def measured_source(case: Case) -> str | None:
     """Where a propeller was measured that bemt knows; None where it was not."""
     stated = case.file.blade.as_built
     return None if stated is None or stated.measured is None else records()[stated.measured].source
+
+
+def _length_faults(told: Designation | None, chord_mm: float | None, pitch_in: float | None) -> Iterator[Fault]:
+    """Measured lengths that are no numbers, or that no propeller of that diameter has."""
+    lengths = (("--chord-mm", chord_mm, "mm", "chord"), ("--measured-pitch-in", pitch_in, "in", "pitch"))
+    for option, value, unit, name in lengths:
+        if value is not None and not math.isfinite(value):
+            yield Fault(option, "", f"{value:g}", f"a length [{unit}]")
+        elif value is not None and told:
+            yield from length_fault(option, value, unit, told.diameter_in * INCH, POSSIBLE[name])
 
 
 def _label(label: str, blades: int | None) -> tuple[Designation | None, list[Fault]]:
@@ -237,6 +240,12 @@ class RotorEstimate(Dataset):
         kind = f", {g.blade_class.replace('_', ' ')}" if g.blade_class else ""
         read = fresh.read_as(g.label, g.diameter_in, g.pitch_in)
         read += f": diameter {g.diameter_in:g} in, pitch {g.pitch_in:g} in, {g.blades} blades{kind}"
+        return "\n".join([read, text_table(head, cells, left=()), *self._notes]) + "\n"
+
+    @property
+    def _notes(self) -> list[str]:
+        """What the columns mean, what not to trust, and what would narrow the bands."""
+        g = self.given
         notes = ["± 68 and 95 %: the rotor itself; on a stand: what yours may show, ± 68 %"]
         if g.source:
             notes.append(f"fitted to its measurement in the {g.source}")
@@ -250,7 +259,7 @@ class RotorEstimate(Dataset):
             more.append("--reading rpm=...,thrust_g=...")
         if more and g.known_from == "label":
             notes.append(f"for narrower bands give {' or '.join(more)}")
-        return "\n".join([read, text_table(head, cells, left=()), *notes]) + "\n"
+        return notes
 
     @property
     def _open_kind(self) -> str:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -138,6 +139,19 @@ class NamedMotor:
         }  # fmt: skip
         return {f"drive.{key}": value for key, value in given.items() if value is not None}
 
+    @property
+    def words(self) -> set[str]:
+        """Words of its file in the list."""
+        return _words(self.source.rpartition(": ")[2])
+
+    def is_called(self, words: Sequence[str]) -> bool:
+        """Whether words are parts of its name, but for numbers near its K_v, which the name rounds."""
+        own = self.words
+        numbers = [w for w in words if not any(w in s for s in own)]
+        return len(numbers) < len(words) and all(
+            re.fullmatch(r"\d{2,5}(?:\.\d+)?", w) and abs(float(w) / self.kv - 1.0) < 0.02 for w in numbers
+        )
+
 
 LIST = "setuav-pythrust"
 """List of motors by name (Karakaya, Apache-2.0), extra ``motors``; its numbers are the makers' own."""
@@ -171,16 +185,12 @@ def named_motor(name: str, where: str = "--motor") -> NamedMotor:
     if not known:
         hint = 'Install it: pip install "bemt[motors]"'
         raise InputError(Fault(where, "", repr(name), f"the list of motors, {LIST}", hint))
-    words, found = [word for word in _words(name) if len(word) > 1], []
-    for one in known:
-        stem = _words(one.source.rpartition(": ")[2])
-        numbers = [w for w in words if not any(w in s for s in stem)]  # a K_v that the name rounds
-        if all(re.fullmatch(r"\d{2,5}(?:\.\d+)?", w) for w in numbers) and len(numbers) < len(words):
-            if all(abs(float(w) / one.kv - 1.0) < 0.02 for w in numbers):
-                found.append((len(stem), one))
-    fewest = [one for size, one in found if size == min(n for n, _ in found)]
+    words = [word for word in _words(name) if len(word) > 1]
+    found = [one for one in known if one.is_called(words)]
+    least = min((len(one.words) for one in found), default=0)
+    fewest = [one for one in found if len(one.words) == least]
     if len(fewest) != 1:
-        names = ", ".join(one.name for _, one in found[:8])
+        names = ", ".join(one.name for one in found[:8])
         got = f"{name!r}, which {'no motor has' if not found else f'{len(found)} motors have'}"
         hint = f"Such as {names}" if names else "How many there are: --rotors" if name.isdigit() else ""
         raise InputError(Fault(where, "", got, "the name of one motor", hint))

@@ -89,8 +89,8 @@ def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str], list
     except InputError as error:
         raise InputError([_of_motor(fault, wanted) for fault in error.faults]) from None
     if wanted.motor is not None and wanted.rpm is None:  # a guess so far
-        text = re.sub(rb"^rpm = \S+", f"rpm = {full_speed(case):.6g}".encode(), files["case.toml"], count=1, flags=re.M)
-        files["case.toml"] = text
+        rpm = f"rpm = {full_speed(case):.6g}".encode()
+        files["case.toml"] = re.sub(rb"^rpm = \S+", rpm, files["case.toml"], count=1, flags=re.M)
         case = checked(files)
     if wanted.campaign:
         files["cfd/campaign.toml"] = _CAMPAIGN.format(name=case.name, rpm=case.rpm, V=case.airspeed_m_s).encode()
@@ -99,27 +99,37 @@ def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str], list
         own = wanted.motor is not None and (folder / "case.toml").is_file()
         free_folder(folder, f", and copy its [drive] into {(folder / 'case.toml').as_posix()}" if own else "")
     _put(files, folder)
-    open_ = [item for item in case.assumptions if item.key.partition(".")[0] in ("rotor", "duct", "blade")]
+    kind, read = _read_of_label(wanted)
+    if not case.file.polars and to_install([s for _, s in case.rotor().blade.anchors], case.file.model.n_crit):
+        read.append(f"its sections are not in the shipped table: first {installs('neuralfoil')}")
+    unused = re.findall(r"^# (column .*)$", files["case.toml"].decode(), re.M)
+    return folder, sorted(files), [*_assumed(wanted, case), *kind, *notes, *read, *unused]
+
+
+def _assumed(wanted: Wanted, case: Case) -> Iterator[str]:
+    """What nobody stated of a fan; the size that stations have."""
+    open_ = [item for item in case.assumptions if item.key.startswith(("rotor.", "duct.", "blade."))]
     told = [f"{item.key.rpartition('.')[2]} {item.nominal:.3g}" for item in open_
             if isinstance(item.nominal, int | float)]  # fmt: skip
-    assumed = [f"assumed, with ranges in case.toml: {', '.join(told)}"] if wanted.fan and told else []
-    unused = re.findall(r"^# (column .*)$", files["case.toml"].decode(), re.M)
+    if wanted.fan and told:
+        yield f"assumed, with ranges in case.toml: {', '.join(told)}"
     if wanted.stations:
         whence = "" if wanted.diameter_mm is not None else f" of the label {wanted.label}"
         reach = _outermost(Path(wanted.stations))
         at = f", outermost station at {1e3 * reach[0]:.5g} mm" if reach else ""
         hub = 1e3 * case.diameter_m * case.get("rotor.hub_ratio")
         size = f"diameter {1e3 * case.diameter_m:.5g} mm{whence}{at}, {case.get('rotor.blades')} blades"
-        assumed.append(f"taken: {size}, hub {hub:.3g} mm, by the innermost station; yours: hub_ratio in case.toml")
-    bare = wanted.label and not (wanted.stations or wanted.scan or wanted.fan or wanted.series)
-    if bare:
-        given = fresh.read_label(str(wanted.label), wanted.blades)
-        read = fresh.read_as(str(wanted.label), given.diameter_in, given.pitch_in)
-        notes += [read] if read != wanted.label else []
-    kind = [line for line in [fresh.open_kind(str(wanted.label), wanted.blades)] if line] if bare else []
-    if not case.file.polars and to_install([s for _, s in case.rotor().blade.anchors], case.file.model.n_crit):
-        notes.append(f"its sections are not in the shipped table: first {installs('neuralfoil')}")
-    return folder, sorted(files), [*assumed, *kind, *notes, *unused]
+        yield f"taken: {size}, hub {hub:.3g} mm, by the innermost station; yours: hub_ratio in case.toml"
+
+
+def _read_of_label(wanted: Wanted) -> tuple[list[str], list[str]]:
+    """What a label alone leaves open, and how it was read where that is not as it is written."""
+    label = wanted.label
+    if not label or wanted.stations or wanted.scan or wanted.fan or wanted.series:
+        return [], []
+    given = fresh.read_label(label, wanted.blades)
+    read, kind = fresh.read_as(label, given.diameter_in, given.pitch_in), fresh.open_kind(label, wanted.blades)
+    return [kind] * bool(kind), [read] * (read != label)
 
 
 def _of_motor(fault: Fault, wanted: Wanted) -> Fault:

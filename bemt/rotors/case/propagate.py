@@ -254,6 +254,13 @@ def _flagged(flags: Iterable[tuple[str, ...]], where: Iterable[bool], word: str)
     return tuple((*f, word) if holds else f for f, holds in zip(flags, where, strict=True))
 
 
+def _that_move_loads(case: Case) -> tuple[Assumption, ...]:
+    """Unknowns of a case and its duct but for the motor's, which move no load at a given speed."""
+    from bemt.rotors.case.prepare import duct_unknowns
+
+    return (*(item for item in case.assumptions if not item.key.startswith("drive.")), *duct_unknowns(case))
+
+
 def propagate(
     case: Case, rpm: ArrayLike | None = None, airspeed_m_s: ArrayLike | None = None,
     density_kg_m3: ArrayLike | None = None, *, angle_deg: ArrayLike | None = None,
@@ -268,15 +275,11 @@ def propagate(
     Whatever a point shares with the case - speed, airspeed, angle, air - follows an unknown that is that quantity.
     ``bands`` False leaves the uncertainties unknown; the flags stay.
     """
-    from bemt.rotors.case.prepare import duct_unknowns
-
     points = Points.of(case, rpm, airspeed_m_s, density_kg_m3, angle_deg)
     if case.paired and np.any(points.angle_deg != 0.0):
         got, expected = f"{np.max(points.angle_deg):g} deg on a coaxial pair", "0 deg: it is solved in axial flow only"
         raise InputError(Fault(case.path.as_posix(), "angle_deg", got, expected))
-    # the motor's unknowns move no load at a given speed
-    own = (*(item for item in case.assumptions if not item.key.startswith("drive.")), *duct_unknowns(case))
-    declared = own if unknowns is None else tuple(unknowns)
+    declared = _that_move_loads(case) if unknowns is None else tuple(unknowns)
     of_second = _unknowns_of_second(case) if unknowns is None else ()
     skewed = (points.angle_deg != 0.0) & (points.airspeed_m_s != 0.0)
     near: Near | None = None

@@ -173,6 +173,13 @@ def _named(text: str, keys: Iterable[str]) -> list[str]:
     return [k for k in told if any(len(words) > 5 and words.lower() in text.lower() for words in told[k])]
 
 
+def _key_of(who: str, year: str, rest: str) -> str:
+    """First author and year; of several such works that whose title follows."""
+    plain = unicodedata.normalize("NFKD", who).encode("ascii", "ignore").decode()
+    key = re.sub(r"\W", "", plain.split(",")[0].split(" ")[0].lower()) + year
+    return next(iter(_named(rest, [k for k in works() if k.rstrip("abc") == key])), key)
+
+
 def bibtex(found: Sources) -> str:
     """Works that an answer stands on, as BibTeX.
 
@@ -201,9 +208,7 @@ def bibtex(found: Sources) -> str:
         cited: dict[str, bool] = {}  # whether the source doubts it
         for work in _WORK.finditer(source.source):
             who, year, rest = work.groups()
-            plain = unicodedata.normalize("NFKD", who).encode("ascii", "ignore").decode()
-            key = re.sub(r"\W", "", plain.split(",")[0].split(" ")[0].lower()) + year
-            key = next(iter(_named(rest, [k for k in works() if k.rstrip("abc") == key])), key)
+            key = _key_of(who, year, rest)
             what = " ".join(rest.split()).strip(" ,.:").removeprefix("not checked")
             if key not in works() and (key not in entries or entries[key][1]["title"] == next(iter(used[key]))):
                 author = re.sub(r"\s*,\s*(?:and )?", " and ", who).replace(" et al.", " and others")

@@ -155,6 +155,4 @@ def export(
         )  # fmt: skip
     except OSError as error:
         raise InputError(system_fault(error)) from error
-    if not made:
-        raise InputError([fault for error in refused for fault in error.faults])
-    return Exported(tuple(manifest for manifest, _ in made), tuple(where for _, where in made), tuple(refused))
+    return Exported.of(made, refused)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -226,6 +226,17 @@ def _remove(out: Path, files: Mapping[str, str]) -> None:
             folder.rmdir()
 
 
+def _loaded(files: Iterable[Path]) -> tuple[list[Case], list[InputError]]:
+    """Cases, and why others are none."""
+    cases, refused = [], []
+    for file in files:
+        try:
+            cases.append(load_case(file))
+        except InputError as error:
+            refused.append(error)
+    return cases, refused
+
+
 def export_cases(
     path: str | Case, out: str, formats: Sequence[str], unit: str = "mm", fillet_mm: float = 0.0,
     min_thickness_mm: float = 0.0, given: Mapping[str, Any] | None = None, hold: tuple[str, ...] = (),
@@ -252,19 +263,14 @@ def export_cases(
     except GeometryError as error:
         faults += [Fault("", f"{_option(name)}-mm", *rest) for name, *rest in error.faults]
     refuse(faults)
-    paths = [] if isinstance(path, Case) else find_cases([path])
-    cases = [path] if isinstance(path, Case) else []
-    refused, made = [], []
-    for file in paths:
-        try:
-            cases.append(load_case(file))
-        except InputError as error:
-            refused.append(error)
-    if len(paths) > 1 and (repeated := repeated_names(dict(enumerate(cases)))):  # they would write into one folder
+    cases, refused = ([path], []) if isinstance(path, Case) else _loaded(find_cases([path]))
+    several = len(cases) + len(refused) > 1
+    if several and (repeated := repeated_names(dict(enumerate(cases)))):  # they would write into one folder
         raise InputError(list(repeated.values()))
+    made = []
     rpm, airspeed = asked.pop("rpm", None), asked.pop("airspeed_m_s", None)
     for case in cases:
-        folder = Path(out) / case.name if len(paths) > 1 else Path(out)
+        folder = Path(out) / case.name if several else Path(out)
         try:
             case = case if rotation is None else case.replaced({"rotor.rotation": rotation})
             job = Job(case, rpm, airspeed, hold, unit, solid, printed, asked, matched_rpm=rpm)
@@ -421,6 +427,13 @@ class Exported(Answered):
     manifests: tuple[Mapping[str, Any], ...]
     folders: tuple[Path, ...]
     refused: tuple[InputError, ...] = ()
+
+    @classmethod
+    def of(cls, made: Sequence[tuple[Manifest, Path]], refused: Sequence[InputError]) -> Exported:
+        """What `export_cases` gives; refused where nothing was written."""
+        if not made:
+            raise InputError([fault for error in refused for fault in error.faults])
+        return cls(tuple(manifest for manifest, _ in made), tuple(where for _, where in made), tuple(refused))
 
     @property
     def files(self) -> tuple[Path, ...]:

@@ -145,12 +145,18 @@ class _Messages:
         return {key: rows[key] for key in first}
 
 
-def _made(name: str, found: Any, topics: Mapping[int, _Messages]) -> FlightLog:
+def _tables(found: Any, topics: Mapping[int, _Messages]) -> dict[str, dict[str, Array]]:
+    """Columns of each topic; of several instances that which moves most."""
     tables: dict[str, dict[str, Array]] = {}
     for d in found.data_list:
         data, known = topics[d.msg_id].columns(d.data), tables.get(d.name)
         if known is None or _moves(data) > _moves(known):
             tables[d.name] = data
+    return tables
+
+
+def _made(name: str, found: Any, topics: Mapping[int, _Messages]) -> FlightLog:
+    tables = _tables(found, topics)
 
     def take(topic: str, keys: list[str]) -> Source | None:
         data = tables.get(topic, {})

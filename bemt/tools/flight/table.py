@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
@@ -57,8 +58,18 @@ def _rotor(heading: str) -> int | None:
 BETAFLIGHT = (b"loopIteration", b"motor[0]")
 """Headings that every CSV of blackbox_decode and of Blackbox Explorer has."""
 _CLOCK = re.compile(r"\b(time|t|timestamp)(_(s|ms|us))?\b|loopIteration", re.IGNORECASE)
+_MOTORS = re.compile(r"motor\[|motor\.|pwm|rpm|controller\.cmd", re.IGNORECASE)
 _HEAD_BYTES = 1 << 18  # within which the headings stand
 _ROWS = 20_000  # of a piece
+
+
+def _headings(name: str, lines: Sequence[str]) -> tuple[int, dict[str, str]]:
+    """Number of the line of headings; what the lines above and units behind the headings say."""
+    start = next((k for k, line in enumerate(lines[:400]) if _CLOCK.search(line) and _MOTORS.search(line)), None)
+    if start is None:
+        raise InputError(Fault(name, "", "no row of headings with a time and motors", _READ))
+    said = {m[1]: m[2] for line in lines[:start] if (m := re.match(r'"?([\w ]+)"?,"?([^"]*)"?\s*$', line))}
+    return start, said | dict(re.findall(r"(\w+) \((\w+)\)", lines[start]))  # vbatLatest (V)
 
 
 def read(path: Path) -> FlightLog:
@@ -68,13 +79,7 @@ def read(path: Path) -> FlightLog:
     name = str(path)
     with path.open("rb") as file:
         head = file.read(_HEAD_BYTES)
-    lines = head.decode("utf-8", errors="replace").split("\n")
-    start = next((k for k, line in enumerate(lines[:400]) if _CLOCK.search(line)
-                  and re.search(r"motor\[|motor\.|pwm|rpm|controller\.cmd", line, re.IGNORECASE)), None)  # fmt: skip
-    if start is None:
-        raise InputError(Fault(name, "", "no row of headings with a time and motors", _READ))
-    said = {m[1]: m[2] for line in lines[:start] if (m := re.match(r'"?([\w ]+)"?,"?([^"]*)"?\s*$', line))}
-    said |= dict(re.findall(r"(\w+) \((\w+)\)", lines[start]))  # vbatLatest (V)
+    start, said = _headings(name, head.decode("utf-8", errors="replace").split("\n"))
     try:
         with path.open("rb") as rows:
             for _ in range(start):

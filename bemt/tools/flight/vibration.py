@@ -89,6 +89,13 @@ def vibration(log: FlightLog) -> Vibration:
     return replace(found, rms=tuple(map(float, log.vibe[here].mean(axis=0))), stated=True)
 
 
+def _too_few(rate: float, windows: int) -> str:
+    """Samples that show nothing, in words; empty where there are enough."""
+    if rate < 4.0 * _LOW_HZ:
+        return f"{rate:.0f} samples a second of the accelerometer"
+    return "under 3 s of samples" if windows < _LEAST else ""
+
+
 def _found(log: FlightLog) -> Vibration:
     """Amplitudes at the rotors' frequencies in flight, in the unit of the sensor: raw accelerations, or rates.
 
@@ -106,8 +113,7 @@ def _found(log: FlightLog) -> Vibration:
     rate = 1.0 / step
     nyquist = 0.5 * rate
     windows = _windows(log, t, step, _WINDOWS_S[0])
-    few = "under 3 s of samples" if len(windows) < _LEAST else ""
-    few = f"{rate:.0f} samples a second of the accelerometer" if nyquist < 2.0 * _LOW_HZ else few
+    few = _too_few(rate, len(windows))
     rms = () if few else _rms(v, windows, step)
     if np.isfinite(shaft) and shaft > 0.97 * nyquist:
         why = (f"the shaft turns at {shaft:.0f} Hz and the {'accelerometer' if log.raw_unit == 'm/s2' else 'gyro'} has "
