@@ -201,6 +201,16 @@ def test_a_repeat_is_weighed_by_the_readings_as_they_would_be_after_it(compared:
     assert np.all(steps > 0.0) and steps[2] < steps[1] < steps[0]
 
 
+def test_a_plan_goes_on_without_a_channel_that_has_no_reading(grid: dict[str, np.ndarray]) -> None:
+    """A torque that is empty in the file: no run would read it, and its noise is nobody's median."""
+    series = recording(case(), grid)
+    record = replace(of(series), measured={**of(series).measured, "torque_Nm": np.full(len(series), np.nan)})
+    plan = build([record], [case()])
+    more = suggest._extended(plan, suggest._options(plan.parts[0])[-1])
+    assert more.y.size > plan.y.size and {*more.channel} == {*plan.channel}
+    assert np.isfinite(more.u).all()
+
+
 def test_no_repeat_is_asked_for_that_tells_nothing(monkeypatch: pytest.MonkeyPatch, compared: chain.Diagnosis) -> None:
     monkeypatch.setattr(suggest, "_distances", lambda *_: 0.5 * (1.0 - np.eye(2)))
     monkeypatch.setattr(suggest, "_check", lambda *_: "")
