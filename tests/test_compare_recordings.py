@@ -786,6 +786,22 @@ def test_a_column_that_is_stuck_is_no_change(tmp_path: Path) -> None:
     assert any("constant_column" in note and "left out" in note for note in answer.document["notes"])
 
 
+def test_a_column_without_a_unit_that_may_be_the_missing_load_is_asked_about(tmp_path: Path) -> None:
+    """It alone goes with the speed as a load does; what it is stated as is compared."""
+    a, b = (stand(seed, scaled(thrust_N=f)) for seed, f in ((1, 1.0), (1001, 1.2)))
+    more = {"pp": b["torque_Nm"] * b["rpm"] * np.pi / 30.0, "setting": b["rpm"], "steady": 1.0 + 0.0 * b["rpm"]}
+    b = {"rpm": b["rpm"], "th": b["thrust_N"], **more, "torque_Nm": b["torque_Nm"]}
+    files = written(tmp_path / "a.csv", a), written(tmp_path / "b.csv", b)
+    (said,) = (n for n in compare(*files).document["notes"] if n.startswith("warning in B"))
+    assert "no thrust is read" in said and "'th' and 'pp'" in said and "setting" not in said
+    assert "--column thrust=th --unit thrust=UNIT" in said and "steady" not in said
+    command = shlex.split(said[said.index("bemt import") :].replace("UNIT", "N"))
+    assert main([*command[1:], "--quiet"]) == 0
+    told = compare(files[0], command[-1])
+    assert told.document["ratios"]["thrust_N"]["ratio"] == pytest.approx(1.2, rel=0.03)
+    assert not any("is read" in n for n in told.document["notes"])
+
+
 def test_a_recording_without_a_speed_is_said_to_have_none(tmp_path: Path) -> None:
     a, b = stand(7), stand(8)
     del b["rpm"]
