@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import runpy
 import shlex
 from collections.abc import Callable, Mapping
@@ -129,6 +130,26 @@ def test_the_cause_is_named_or_in_the_class(
     assert answer.verdict in ("named", "sensor", "class")
     assert cause in answer.effects
     assert answer.document["next_measurement"]["text"]
+
+
+@pytest.mark.parametrize(
+    ("change", "size"),
+    [
+        (scaled(thrust_N=1.0 / 4.4482216152605), r"wrong unit or sign \(thrust in lbf\)"),
+        (_zero, r"zero offset of the thrust cell \(\+[23]\.?\d* % of the largest reading, (0\.\d+) N\)"),
+        (scaled(rpm=7.0), r"wrong speed of rotation \(x7: revolutions of 7 pole pairs\)"),
+    ],
+    ids=["unit", "zero", "count"],
+)
+def test_a_cause_is_said_with_its_size(tmp_path: Path, change: Callable[[dict[str, Array]], None], size: str) -> None:
+    answer = compare(*pair(tmp_path, change))
+    said = re.search(size, " ".join(answer.text.split()))
+    assert said, answer.text
+    if said.groups():
+        zero = 0.03 * float(np.max(stand(1001)["thrust_N"]))
+        assert float(said[1]) == pytest.approx(zero, rel=0.2)
+        row, full = answer.document["ranking"][0], answer.document["full_scale"]["thrust_N"]
+        assert row["parameters"]["zero"]["value"] * full == pytest.approx(float(said[1]), rel=0.01)
 
 
 def test_what_scales_alike_is_a_class_and_never_one_name(tmp_path: Path) -> None:
@@ -346,6 +367,7 @@ def test_pole_pairs_that_are_the_next_winding_are_named_by_their_ratio(tmp_path:
     assert next(iter(answer.document["subsystems"]["drive"]["ranking"]), {"effect": "none"})["effect"] == "none"
     if driven:
         assert answer.effects[0] == "rpm_scale" and "no change beyond scatter" not in answer.text
+        assert "x7/6: 6 pole pairs set instead of 7" in " ".join(answer.text.split())
         first = compare(*files, case=CASES / "prop_10x5").document["ranking"][0]  # nor does a case unsay it
         assert first["effect"] == "rpm_scale" and first["probability"] > 0.8
 

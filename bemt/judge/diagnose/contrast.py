@@ -285,7 +285,7 @@ def _diagnosed(
     """The same with the verdict of the diagnosis of B with A as reference."""
     from bemt.judge.diagnose.chain import diagnose
     from bemt.judge.diagnose.document import document as diagnosis
-    from bemt.judge.diagnose.document import explanation
+    from bemt.judge.diagnose.document import explanation, full_scale
 
     a, b = (
         load(name, case, imported) if "format" in imported.provenance else from_series(imported, case)
@@ -298,7 +298,7 @@ def _diagnosed(
     verdict, effects, probability, ranking, rule = (by_case[k] for k in DIAGNOSED)
     return replace(said, verdict=verdict, effects=tuple(effects), probability=probability, rule=rule,
                    ranking=rows_of(RankedCause, ranking), diagnosis=by_case, case=case.name,
-                   told=tuple(told))  # fmt: skip
+                   told=tuple(told), full_scale=full_scale(answer))  # fmt: skip
 
 
 def _given(asked: Invocation) -> Given:
