@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import runpy
 import shlex
 from collections.abc import Callable, Mapping
@@ -129,6 +130,26 @@ def test_the_cause_is_named_or_in_the_class(
     assert answer.verdict in ("named", "sensor", "class")
     assert cause in answer.effects
     assert answer.document["next_measurement"]["text"]
+
+
+@pytest.mark.parametrize(
+    ("change", "size"),
+    [
+        (scaled(thrust_N=1.0 / 4.4482216152605), r"wrong unit or sign \(thrust in lbf\)"),
+        (_zero, r"zero offset of the thrust cell \(\+[23]\.?\d* % of the largest reading, (0\.\d+) N\)"),
+        (scaled(rpm=7.0), r"wrong speed of rotation \(x7: revolutions of 7 pole pairs\)"),
+    ],
+    ids=["unit", "zero", "count"],
+)
+def test_a_cause_is_said_with_its_size(tmp_path: Path, change: Callable[[dict[str, Array]], None], size: str) -> None:
+    answer = compare(*pair(tmp_path, change))
+    said = re.search(size, " ".join(answer.text.split()))
+    assert said, answer.text
+    if said.groups():
+        zero = 0.03 * float(np.max(stand(1001)["thrust_N"]))
+        assert float(said[1]) == pytest.approx(zero, rel=0.2)
+        row, full = answer.document["ranking"][0], answer.document["full_scale"]["thrust_N"]
+        assert row["parameters"]["zero"]["value"] * full == pytest.approx(float(said[1]), rel=0.01)
 
 
 def test_what_scales_alike_is_a_class_and_never_one_name(tmp_path: Path) -> None:
@@ -346,6 +367,7 @@ def test_pole_pairs_that_are_the_next_winding_are_named_by_their_ratio(tmp_path:
     assert next(iter(answer.document["subsystems"]["drive"]["ranking"]), {"effect": "none"})["effect"] == "none"
     if driven:
         assert answer.effects[0] == "rpm_scale" and "no change beyond scatter" not in answer.text
+        assert "x7/6: 6 pole pairs set instead of 7" in " ".join(answer.text.split())
         first = compare(*files, case=CASES / "prop_10x5").document["ranking"][0]  # nor does a case unsay it
         assert first["effect"] == "rpm_scale" and first["probability"] > 0.8
 
@@ -784,6 +806,22 @@ def test_a_column_that_is_stuck_is_no_change(tmp_path: Path) -> None:
     answer = compare(written(tmp_path / "a.csv", a), written(tmp_path / "b.csv", b))
     assert answer.verdict == "none" and set(answer.document["ratios"]) == {"thrust_N"}
     assert any("constant_column" in note and "left out" in note for note in answer.document["notes"])
+
+
+def test_a_column_without_a_unit_that_may_be_the_missing_load_is_asked_about(tmp_path: Path) -> None:
+    """It alone goes with the speed as a load does; what it is stated as is compared."""
+    a, b = (stand(seed, scaled(thrust_N=f)) for seed, f in ((1, 1.0), (1001, 1.2)))
+    more = {"pp": b["torque_Nm"] * b["rpm"] * np.pi / 30.0, "setting": b["rpm"], "steady": 1.0 + 0.0 * b["rpm"]}
+    b = {"rpm": b["rpm"], "th": b["thrust_N"], **more, "torque_Nm": b["torque_Nm"]}
+    files = written(tmp_path / "a.csv", a), written(tmp_path / "b.csv", b)
+    (said,) = (n for n in compare(*files).document["notes"] if n.startswith("warning in B"))
+    assert "no thrust is read" in said and "'th' and 'pp'" in said and "setting" not in said
+    assert "--column thrust=th --unit thrust=UNIT" in said and "steady" not in said
+    command = shlex.split(said[said.index("bemt import") :].replace("UNIT", "N"))
+    assert main([*command[1:], "--quiet"]) == 0
+    told = compare(files[0], command[-1])
+    assert told.document["ratios"]["thrust_N"]["ratio"] == pytest.approx(1.2, rel=0.03)
+    assert not any("is read" in n for n in told.document["notes"])
 
 
 def test_a_recording_without_a_speed_is_said_to_have_none(tmp_path: Path) -> None:

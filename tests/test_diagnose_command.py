@@ -20,7 +20,7 @@ import bemt
 from bemt.app.cli import main, parsed
 from bemt.base.errors import InputError
 from bemt.judge.diagnose import assemble, chain, document, other_rotor, record, suggest
-from bemt.judge.diagnose.answer import stretches
+from bemt.judge.diagnose.answer import bare, stretches
 from bemt.judge.diagnose.load import load
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case import load_case
@@ -410,6 +410,15 @@ def test_without_an_explanation_the_first_sentence_is_what_the_recording_shows(c
     assert (float(told[2]), float(told[3])) == pytest.approx((0.41, 0.69), abs=0.1)
     where = answer.where
     assert second.startswith("Beyond the uncertainty") == ((where.channel, where.size > 0) != (channel, True))
+
+
+def test_a_load_of_many_times_the_cases_is_a_factor_of_what_the_case_gives() -> None:
+    """No share of the readings, which are in another unit: ten times the torque is not high by 90 %."""
+    series = recording(case(), points("static"), noise=0.003)
+    values = {**series.values, "torque_Nm": 12.0 * series["torque_Nm"]}
+    answer = chain.diagnose([record.from_series(Dataset("bench", "log", values), case())], [case()])
+    shown = bare(answer.found).sentence(answer.words)
+    assert re.match(r"Torque is x1[12](\.\d+)? of what the case gives", shown), shown
 
 
 def test_a_channel_low_at_one_end_and_high_at_the_other_is_said_so() -> None:

@@ -12,6 +12,7 @@ import pytest
 from diagnosing import case, compressibility_missed, points, recording
 
 import bemt
+from bemt.base.errors import InputError
 from bemt.judge import loss
 from bemt.judge.diagnose import chain, knowledge, other_rotor, posterior, suggest
 from bemt.judge.diagnose.assemble import build
@@ -199,6 +200,31 @@ def test_a_repeat_is_weighed_by_the_readings_as_they_would_be_after_it(compared:
         told.append(suggest._distances(plan, of, hyper)[0, 1])
     steps = np.diff(told)
     assert np.all(steps > 0.0) and steps[2] < steps[1] < steps[0]
+
+
+def test_a_plan_goes_on_without_a_channel_that_has_no_reading(grid: dict[str, np.ndarray]) -> None:
+    """A torque that is empty in the file: no run would read it, and its noise is nobody's median."""
+    series = recording(case(), grid)
+    record = replace(of(series), measured={**of(series).measured, "torque_Nm": np.full(len(series), np.nan)})
+    plan = build([record], [case()])
+    more = suggest._extended(plan, suggest._options(plan.parts[0])[-1])
+    assert more.y.size > plan.y.size and {*more.channel} == {*plan.channel}
+    assert np.isfinite(more.u).all()
+
+
+@pytest.mark.parametrize("checks", ["", "rpm_scale"])
+def test_the_next_command_is_not_the_one_that_was_just_typed(checks: str) -> None:
+    given = suggest.Given(("b.csv",), ("a.csv",), "--case 10x5", ruled_out=("thrust_zero",))
+    found = chain._commands(suggest.Suggestion("look at it", "look", checks=checks), given)
+    assert given.command() not in found and len(found) == bool(checks)
+
+
+def test_loads_without_a_number_are_said_to_have_none() -> None:
+    nan = np.full(5, np.nan)
+    table = pd.DataFrame({"rpm": np.linspace(3e3, 6e3, 5), "thrust_N": nan, "torque_Nm": nan})
+    with pytest.raises(InputError, match="no number in any row") as refused:
+        bemt.diagnose(table, "10x5")
+    assert "thrust_N and torque_Nm" in str(refused.value) and "expected a thrust" not in str(refused.value)
 
 
 def test_no_repeat_is_asked_for_that_tells_nothing(monkeypatch: pytest.MonkeyPatch, compared: chain.Diagnosis) -> None:

@@ -474,6 +474,22 @@ def test_command_writes_two_files_and_says_so(
     assert "report.html" in capsys.readouterr().out
 
 
+def test_the_summary_says_a_sentence_of_a_diagnosis_once_and_whole(tmp_path: Path) -> None:
+    """Of a case without a reference of its own, the answer is the first of them."""
+    case = write_case(tmp_path / "cases", "plain", "A plain propeller", "")
+    (case / "references.csv").unlink()
+    (case / "case.toml").write_text((case / "case.toml").read_text().replace('references = "references.csv"\n', ""))
+    said = [f"Part {k} is {k}.5% before and 0.5 % after, at rest as in wind." for k in range(40)]
+    folder = tmp_path / "plain" / "diagnosis"
+    folder.mkdir(parents=True)
+    (folder / "diagnosis.json").write_text(json.dumps(DIAGNOSIS | {"explanation": " ".join(said)}))
+    told = summary(attach_diagnoses(gather([case], tmp_path / "out"), tmp_path))
+    (line,) = (line for line in told.splitlines() if line.startswith("Diagnosis: "))
+    assert said[0] in told.partition(line)[0]
+    assert max(told.count(one) for one in said) == 1 and "…" not in line and line.endswith(said[-1][-8:])
+    assert 600 < len(line) < 900
+
+
 # ---- the committed report -------------------------------------------------------------------------------------------
 
 

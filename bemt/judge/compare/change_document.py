@@ -20,6 +20,7 @@ from bemt.judge.compare.drive_laws import FAMILY, FAMILY_WORD, Judgement, check_
 from bemt.judge.compare.matched import LOADS, OVER_COMMAND, WITHOUT_SPEED
 from bemt.judge.compare.recordings import IN_WIND, NO_SPEED, NOTHING_SHARED, OTHER_STAND, REVERSED, RunChange
 from bemt.judge.compare.selection import Invocation
+from bemt.judge.compare.sizes import titled
 from bemt.judge.compare.smooth_change import Ratio
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation, Size
 from bemt.judge.loss import SPREAD, checks_by_worth, minutes, ways
@@ -172,6 +173,7 @@ class ComparedRuns(Documented):
     points: Mapping[str, int] = field(default_factory=dict)
     assumed: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    full_scale: Mapping[str, float] = field(default_factory=dict)  # Largest readings of B, SI, of which shares are
     recordings: tuple[str, ...] = ()
     rows: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     next_measurement: Mapping[str, Any] = field(default_factory=dict)
@@ -198,7 +200,7 @@ def document(change: RunChange) -> ComparedRuns:
         _ranking(said),
         {name: SubVerdict(j.verdict, j.effects, j.why, _ranking(j))
          for name, j in (("loads", change.loads), ("drive", change.drive))},
-        change.ratios, {"A": len(change.a), "B": len(change.b)}, change.assumed, change.notes,
+        change.ratios, {"A": len(change.a), "B": len(change.b)}, change.assumed, change.notes, said.full_scale,
     )  # fmt: skip
 
 
@@ -297,11 +299,16 @@ def headline(doc: ComparedRuns) -> str:
         return f"Nothing but the air changed, as recorded ({moved}); the coefficients agree."
     if len(effects) == 1:
         lead = "The stand, not the rotor" if verdict == "sensor" else "What changed"
-        return f"{lead}: {title_of(effects[0])} ({moved or 'drive alone'})."
+        return f"{lead}: {_title(doc, effects[0])} ({moved or 'drive alone'})."
     several = families(effects, doc.ranking)
     if several.count(", or ") >= _MANY:  # what was measured first, where little is known of the cause
         return f"{moved[0].upper()}{moved[1:]}: {several}." if moved else f"The drive: {several}."
     return f"{several[0].upper()}{several[1:]} ({moved or 'drive alone'})."
+
+
+def _title(doc: ComparedRuns, name: str) -> str:
+    """Title of a cause, or of a pair of them, with the size as far as it was worked out."""
+    return titled(name, next((r.parameters for r in doc.ranking if r.effect == name), {}), doc.full_scale)
 
 
 def _moved(doc: ComparedRuns) -> str:
@@ -419,7 +426,7 @@ def sentence(doc: ComparedRuns) -> str:
         if len(doc.sets) > 1:  # more than one cause
             return f"{doc.rule}{sure}: {names}."
         P = {Explanation.of(*r.effect.split("+")): r.probability for r in doc.ranking}
-        return one_of(doc.probability, {title_of(str(k)): P.get(k, 0.0) for k in ways(doc.effects, P)})
+        return one_of(doc.probability, {_title(doc, str(k)): P.get(k, 0.0) for k in ways(doc.effects, P)})
     if doc.verdict == "unknown":
         return f"Unknown: {doc.rule}."
     first = [title_of(k) for k in _likely(doc)]

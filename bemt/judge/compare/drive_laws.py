@@ -66,13 +66,15 @@ class Judgement(Decision):
 
     ranked: Mapping[Explanation, float] = field(default_factory=dict)  # Of every explanation, the likeliest first [1]
     parameters: Sizes = field(default_factory=dict)  # Of effects, as far as they were worked out
+    full_scale: Mapping[str, float] = field(default_factory=dict)  # Largest readings of B that shares are of [SI]
 
     @classmethod
-    def of(cls, said: Decision, P: Mapping[Explanation, float], parameters: Sizes | None = None) -> Judgement:
+    def of(cls, said: Decision, P: Mapping[Explanation, float], parameters: Sizes | None = None,
+           full_scale: Mapping[str, float] | None = None) -> Judgement:  # fmt: skip
         """The same decision with its posterior."""
         ranked = dict(sorted(P.items(), key=lambda kv: -kv[1]))
         return cls(**{f.name: getattr(said, f.name) for f in fields(Decision)}, ranked=ranked,
-                   parameters=parameters or {})  # fmt: skip
+                   parameters=parameters or {}, full_scale=full_scale or {})  # fmt: skip
 
 
 @dataclass(frozen=True)

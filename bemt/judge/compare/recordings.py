@@ -178,7 +178,7 @@ class RunChange:
         loads, drive = self.with_density(decide(P)).reasoned_as(self.loads), decide(Q).reasoned_as(self.drive)
         said = joined(loads, drive, P.get(NONE, 0.0))
         P = {"model": P, "drive": Q}.get(said.by, P | Q)
-        return Judgement.of(said, P, {**self.loads.parameters, **self.drive.parameters})
+        return Judgement.of(said, P, {**self.loads.parameters, **self.drive.parameters}, self.loads.full_scale)
 
     def with_density(self, said: Decision) -> Decision:
         """The recorded densities as the cause where nothing else is one."""

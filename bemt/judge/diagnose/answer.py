@@ -181,8 +181,9 @@ def _largest(found: Evidence, d: Array, natural: tuple[str, ...]) -> Location:
     size = float(np.mean((d / problem.largest)[here][inside]))
     f0 = problem.f0[here][inside]
     largest = problem.largest[here][inside]
-    loaded = bool(np.all(np.abs(f0) > _NEAR_ZERO * largest))
-    known = (problem.channel == channel) & ~free & (np.abs(problem.f0) > _NEAR_ZERO * problem.largest)
+    known = np.abs(problem.f0) > _NEAR_ZERO * problem.largest_computed
+    loaded = bool(np.all(known[here][inside]))
+    known = known & (problem.channel == channel) & ~free
     usual = float(np.median(problem.y[known] / problem.f0[known])) if known.any() else 1.0
     beside = problem.y[here][inside] / usual - f0
     ratio = float(np.median(beside / f0)) if loaded else float("nan")

@@ -250,18 +250,20 @@ def assemble(parts: tuple[Part, ...], blade: CalibratedBlade = PLAIN, like: Prob
     y = np.concatenate([np.concatenate([p.record.measured[c] for c in p.channels]) for p in parts])
     u = np.concatenate([np.concatenate([p.record.u[c] for c in p.channels]) for p in parts])
     f0 = np.concatenate(full)
-    kept = np.isfinite(y) & np.isfinite(f0)
     sizes = [len(p.record) for p in parts]
     first = np.cumsum([0, *sizes])
     channel = np.concatenate(
         [np.repeat([CHANNELS.index(c) for c in p.channels], n) for p, n in zip(parts, sizes, strict=True)]
     )
+    # a stand goes on without the channels that it has no reading of
+    read = np.isfinite(y) & (like is None or np.isin(channel, like.channel))
+    kept = read & np.isfinite(f0)
     point = np.concatenate(
         [np.tile(np.arange(n) + f, len(p.channels)) for p, n, f in zip(parts, sizes, first, strict=False)]
     )
     part = np.repeat(np.arange(len(parts)), [len(p.channels) * n for p, n in zip(parts, sizes, strict=True)])
     notes = [f"{p.record.name}: {note}" for p in parts for note in p.record.notes]
-    lost = int(np.isfinite(y).sum() - kept.sum())
+    lost = int(read.sum() - kept.sum())
     if lost:
         notes.append(f"{lost} readings dropped: the baseline does not converge there")
     scale = np.concatenate([_scale(p) for p in parts])

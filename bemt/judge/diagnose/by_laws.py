@@ -79,7 +79,9 @@ def judged(pair: RunChange, only: Collection[str] | None = None, gone: Collectio
         said = replace(said, why=recordings.REVERSED)
     elif said.verdict == "insufficient" and (why := pair.no_pair):
         said = replace(said, why=why)
-    return Judgement.of(said, P, parameters)
+    test = found.problem.parts[0]
+    told = (k for k in test.channels if k not in test.record.unitless and not (k == "torque_Nm" and pair.by_proxy))
+    return Judgement.of(said, P, parameters, {k: test.full_scale[k] for k in told})
 
 
 def _factored(found: posterior.Evidence, pair: RunChange) -> dict[Explanation, float]:

@@ -203,7 +203,11 @@ def _next(
 
 
 def _commands(chosen: suggestion.Suggestion, given: suggestion.Given) -> tuple[str, ...]:
-    """What to type after a step."""
+    """What to type after a step, unless it would ask the same again."""
+    return tuple(c for c in _all_commands(chosen, given) if c != given.command())
+
+
+def _all_commands(chosen: suggestion.Suggestion, given: suggestion.Given) -> tuple[str, ...]:
     if chosen.kind == "reference":
         file = "reference.csv"
         return given.command(reference=file), given.comparison(file)

@@ -12,12 +12,16 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+import numpy as np
+
 from bemt.base.action import Told
 from bemt.base.document import rows_of
 from bemt.base.errors import Fault, InputError
 from bemt.base.page import FIRST
 from bemt.base.tables import json_text, write_atomic
 from bemt.base.units import INCH
+from bemt.data.readers.left_open import one_step
+from bemt.data.recordings.channels import named
 from bemt.data.recordings.check import OPEN_OR_OUT, check, left_out
 from bemt.data.recordings.load import as_stated, import_file, one_as_stated, stated_options
 from bemt.judge.compare import one_run, two_runs
@@ -47,6 +51,8 @@ _REMARK = "Before any physics"
 _STUCK = "constant_column"
 # Rows and number of the values of a column that tells parts of one file apart.
 _ROWS, _KINDS = 3, 20
+# Range of speeds, ln, that shows how a column goes with it, powers of a load or its power, and correlation [1].
+_SPAN, _POWERS, _ALIKE = 0.2, (1.5, 3.5), 0.95
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +142,7 @@ def compare(
         said = _diagnosed(said, asked, read, rotor, found, progress)
     return Contrast(found, replace(
         said, recordings=tuple(names), rows={"A": tuple(rows_a), "B": tuple(rows_b)},
-        notes=(*_errors(findings), *said.notes), next_measurement=_next(said, found, asked),
+        notes=(*_errors(findings), *_unread(read, names), *said.notes), next_measurement=_next(said, found, asked),
     ))  # fmt: skip
 
 
@@ -227,6 +233,35 @@ def _errors(findings: Sequence[Sequence[Finding]]) -> list[str]:
     return out
 
 
+def _unread(read: Sequence[Dataset], names: Sequence[str]) -> list[str]:
+    """Notes on a load that the other recording has, where columns without a unit go with the speed as a load does."""
+    known, out = [named(imported) for imported in read], []
+    for k, letter in enumerate("AB"):
+        lacks = [c.partition("_")[0] for c in ("thrust_N", "torque_Nm") if c in known[1 - k] and c not in known[k]]
+        columns = _like_loads(read[k], known[k]) if lacks else []
+        if columns:
+            how = one_step(names[k], [f"--column {lacks[0]}={shlex.quote(columns[0])}", f"--unit {lacks[0]}=UNIT"])
+            goes = f"{' and '.join(map(repr, columns))}, which {'goes' if len(columns) == 1 else 'go'}"
+            out.append(f"warning in {letter}: no {' and no '.join(lacks)} is read, which {'BA'[k]} has; not used, "
+                       f"without a unit: {goes} with the speed as loads do. State it as in: {how}")  # fmt: skip
+    return out
+
+
+def _like_loads(imported: Dataset, known: Dataset) -> list[str]:
+    """Headings of columns without a unit that rise with a power of the speed as loads do, nearest its square first."""
+    out = {}
+    for name, v in imported.values.items():
+        loaded = np.isfinite(v) & (v != 0.0) & (known.rpm > 0.0) if "rpm" in known else np.zeros(v.size, dtype=bool)
+        n = np.log(known.rpm[loaded])
+        if imported.units.get(name) != "" or n.size < _ROWS or np.ptp(n) < _SPAN:
+            continue
+        load = np.log(np.abs(v[loaded]))
+        power = float(np.polyfit(n, load, 1)[0])
+        if _POWERS[0] < power < _POWERS[1] and np.corrcoef(n, load)[0, 1] > _ALIKE:
+            out[imported.headings.get(name, name)] = abs(power - 2.0)
+    return sorted(out, key=lambda k: out[k])
+
+
 def _two_choices(name: str) -> str:
     """How to choose two parts of one file, with a column that tells them apart."""
     how = "Its scatter would count as agreement"
@@ -250,7 +285,7 @@ def _diagnosed(
     """The same with the verdict of the diagnosis of B with A as reference."""
     from bemt.judge.diagnose.chain import diagnose
     from bemt.judge.diagnose.document import document as diagnosis
-    from bemt.judge.diagnose.document import explanation
+    from bemt.judge.diagnose.document import explanation, full_scale
 
     a, b = (
         load(name, case, imported) if "format" in imported.provenance else from_series(imported, case)
@@ -263,7 +298,7 @@ def _diagnosed(
     verdict, effects, probability, ranking, rule = (by_case[k] for k in DIAGNOSED)
     return replace(said, verdict=verdict, effects=tuple(effects), probability=probability, rule=rule,
                    ranking=rows_of(RankedCause, ranking), diagnosis=by_case, case=case.name,
-                   told=tuple(told))  # fmt: skip
+                   told=tuple(told), full_scale=full_scale(answer))  # fmt: skip
 
 
 def _given(asked: Invocation) -> Given:

@@ -11,6 +11,7 @@ from bemt.base.tables import or_null, text_table
 from bemt.data.recordings.channels import AS_ELECTRICAL, AS_SHAFT
 from bemt.judge.compare.change_document import WORD, families, one_of
 from bemt.judge.compare.drive_laws import title_of
+from bemt.judge.compare.sizes import in_words, of_largest, sized, titled
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import other_rotor
 from bemt.judge.diagnose.answer import POWER, Diagnosis, bare, share
@@ -21,7 +22,6 @@ from bemt.judge.diagnose.suggest import LEVEL
 from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation, Size
 from bemt.judge.loss import CLAIMS, ways
 from bemt.physics import effects
-from bemt.physics.effects import Parameter
 from bemt.physics.effects.propeller import AnotherPropeller
 from bemt.rotors.case.fresh import OPEN_ENDINGS
 
@@ -113,57 +113,35 @@ def _parameters(d: Diagnosis) -> str:
     each = []
     for i, found in d.parameters.items():
         of = {p.name: p for p in effects.catalogue()[i].parameters}
-        words, left = [], []
+        first, left = in_words(found), []
+        words = [first] if first else []
         for k, v in found.items():
+            if k in ("channel", "unit") or (k == "factor" and (first or v.value == 1.0)):
+                continue
+            word = k if k != "eps" else "off by another" if first else "off by"
             if isinstance(v.value, float) and v.high - v.low > _OPEN * (of[k].high - of[k].low):
                 left.append(k)
             elif isinstance(v.value, float):
-                low, value, high = (_sized(of[k], end) for end in (v.low, v.value, v.high))
-                words.append(f"{k} {value} ({low} to {high}){_in_units(d, i, k, v.value)}{_odds(v)}")
+                low, value, high = (sized(of[k], end) for end in (v.low, v.value, v.high))
+                words.append(f"{word} {value} ({low} to {high}){of_largest(i, k, v.value, full_scale(d))}{_odds(v)}")
             elif v.value is not None:
-                words.append(f"{k} {v.value}{_odds(v)}")
+                words.append(f"{word} {v.value}{_odds(v)}")
         words += [f"{' and '.join(left)} not determined"] if left else []
         if words:
             each.append((f"{title_of(i)}: " if len(d.parameters) > 1 else "") + ", ".join(words))
     return "; ".join(each)
 
 
-def _is_share(p: Parameter) -> bool:
-    """Whether a number without a unit is a share of something."""
-    return p.unit == "1" and p.off == 0.0 and max(abs(p.low), abs(p.high)) < 1.0
-
-
-def _sized(p: Parameter, value: float, form: str = ".3g") -> str:
-    """Number with its unit; a share in percent."""
-    if _is_share(p):
-        return f"{100.0 * value:{form}} %"
-    return f"{value:{form}}" if p.unit in ("1", "") else f"{value:{form}} {p.unit}"
-
-
 def _title(d: Diagnosis, name: str, sized: bool = False) -> str:
     """Title of an effect, with its state if that is not the usual one; ``sized``: where one number is its size, it."""
-    title, cls, found = title_of(name), effects.catalogue().get(name), d.parameters.get(name, {})
-    if cls is None or title != cls.title:  # of a law of the drive
-        return title
-    if sized and cls.fault == "unit" and "unit" in found:
-        return f"{title} ({found['channel'].value}: {found['unit'].value})"
-    if "state" in found and found["state"].value != cls().state:  # type: ignore[attr-defined]
-        return f"{title} ({found['state'].value})"
-    sizes = [p for p in cls.parameters if sized and p.off is not None and p.steps and p.name in found]
-    value = found[sizes[0].name].value if len(sizes) == 1 else None
-    if not isinstance(value, float) or (sizes[0].unit == "1" and not _is_share(sizes[0])):
-        return title
-    return f"{title} ({_sized(sizes[0], value, '+.3g')})"
+    found = d.parameters.get(name, {})
+    return titled(name, found if sized else {k: v for k, v in found.items() if k == "state"}, full_scale(d))
 
 
-def _in_units(d: Diagnosis, name: str, parameter: str, value: float) -> str:
-    """The same of a shifted cell, in the unit of its channel."""
-    channel = effects.catalogue()[name].sensor
+def full_scale(d: Diagnosis) -> Mapping[str, float]:
+    """Largest reading of each channel of the recording [SI]."""
     scales = [p.full_scale for p in d.problem.parts if not p.record.reference]
-    if parameter != "zero" or not scales or channel not in scales[0]:
-        return ""
-    unit = {"thrust_N": "N", "torque_Nm": "N m", "rpm": "rev/min"}[channel]
-    return f" of the largest reading, {value * max(s[channel] for s in scales):.3g} {unit}"
+    return {k: max(s[k] for s in scales if k in s) for k in {k for s in scales for k in s}}
 
 
 def _odds(told: Size) -> str:

@@ -234,12 +234,17 @@ class Problem:
     @property
     def largest(self) -> Array:
         """Largest value of the channel at the point's speed and density, read or computed, (M,)."""
+        return np.maximum(self.scale, self.largest_computed)
+
+    @cached_property
+    def largest_computed(self) -> Array:
+        """The same of the baseline alone: a reading in another unit makes no computed load small, (M,)."""
         out = self.scale.copy()
         for k in np.unique(self.part):
             for c in np.unique(self.channel):
                 mine = (self.part == k) & (self.channel == c)
                 if mine.any():
-                    out[mine] *= max(1.0, float(np.quantile(np.abs(self.f0 / self.scale)[mine], 0.9)))
+                    out[mine] *= float(np.quantile(np.abs(self.f0 / self.scale)[mine], 0.9))
         return out
 
     @cached_property

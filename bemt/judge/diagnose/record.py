@@ -177,6 +177,8 @@ def _loads_of(series: Dataset, got: Mapping[str, Array], notes: list[str]) -> li
     told = [k for k in ("thrust_N", "torque_Nm") if k in got and np.isfinite(got[k]).any()]
     loads = [k for k in told if np.any(np.nan_to_num(got[k]))]
     notes += [f"{k} is 0 in every row: not measured, ignored" for k in told if k not in loads]
+    if not loads and (empty := [k for k in ("thrust_N", "torque_Nm") if k in got and k not in told]):
+        raise InputError(Fault(series.name, " and ".join(empty), "no number in any row", "one row or more"))
     if not loads:
         channels = ", ".join(series.values) + "".join(f"; {n}" for n in notes if n.endswith("left out"))
         raise InputError(

@@ -291,7 +291,16 @@ def page_verdict(page: CasePage) -> tuple[str, str, str]:
     if own[1] != NOTHING_RECORDED or not item:
         return own
     kind, word, why = diagnosis_verdict(item)
-    return kind, word, f"{own[2].partition('. ')[0]}. {re.split(r'(?<=[.]) (?=[A-Z])', why)[0]}"
+    return kind, word, f"{own[2].partition('. ')[0]}. {sentences(why)[0]}"
+
+
+def sentences(words: str) -> list[str]:
+    """Sentences of a text; a point inside a number or a unit ends none.
+
+    >>> sentences("Thrust is +1.5 % off. Torque is not.")
+    ['Thrust is +1.5 % off.', 'Torque is not.']
+    """
+    return re.split(r"(?<=[.]) (?=[A-Z])", words)
 
 
 def first_pictures(item: Diagnosed) -> list[Picture]:

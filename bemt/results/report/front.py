@@ -16,6 +16,7 @@ from bemt.results.report.diagnosis_block import (
     headline,
     lead,
     page_verdict,
+    sentences,
     verdict,
 )
 from bemt.results.report.plot import Figure, Mark, Plot, figure, points
@@ -46,6 +47,7 @@ OF_TABLE = (
     "that; first value of each source. Click a heading to sort."
 )
 
+_MOST = 800  # characters of a diagnosis in the summary, in whole sentences
 NO_NUMBER = "No case has a thrust, neither solved nor recorded: its page says what it lacks."
 
 
@@ -191,11 +193,11 @@ def summary(book: Book) -> str:
                     ]
         item = page.diagnosis
         if item:
-            out += [
-                "",
-                f"Diagnosis: {plain_markdown(diagnosis_verdict(item)[1], 80)}. "
-                f"{plain_markdown(diagnosis_verdict(item)[2], 800)}",
-            ]
+            _, word, why = diagnosis_verdict(item)
+            new = [said for said in sentences(why) if said not in page_verdict(page)[2]]
+            short = [said for k, said in enumerate(new) if len(" ".join(new[: k + 1])) <= _MOST]
+            why = plain_markdown(" ".join(short or new), _MOST)
+            out += ["", f"Diagnosis: {plain_markdown(word, 80)}. {why}".strip()]
         out += [f"- {plain_markdown(fault)}" for fault in r.faults[:20]]
         out += ["", *(f"Note: {plain_markdown(note)}" for note in page.problems)] if page.problems else []
     return "\n".join(out) + "\n"

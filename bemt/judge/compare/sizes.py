@@ -1,0 +1,95 @@
+"""Causes with their sizes, as a person says them: one home for the words of every answer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from bemt.base.unit_errors import speed_ratio
+from bemt.judge.compare.drive_laws import title_of
+from bemt.judge.explanation import Size
+from bemt.physics import effects
+from bemt.physics.effects import Parameter
+
+Found = Mapping[str, Size]
+"""Parameters of one effect, by name."""
+_WORD = {"thrust_N": "thrust", "torque_Nm": "torque", "rpm": "speed", "airspeed_m_s": "airspeed",
+         "density_kg_m3": "density", "loads": "thrust and torque"}  # fmt: skip
+_UNIT = {"thrust_N": "N", "torque_Nm": "N m", "rpm": "rev/min"}
+_SEEN = 0.05  # least probability of a value that is listed
+
+
+def titled(name: str, found: Found, largest: Mapping[str, float] | None = None) -> str:
+    """Title of an effect, and in brackets its state if that is not the usual one, else its size where one number is it.
+
+    ``largest``: largest reading by channel [SI], of which a shifted cell is a share.
+    """
+    title, cls = title_of(name), effects.catalogue().get(name)
+    if cls is None or title != cls.title:  # of a law of the drive
+        return title
+    told = _stated(name, found) or _likeliest(found)
+    sizes = [p for p in cls.parameters if p.off is not None and (p.steps or p.name == "eps") and p.name in found]
+    value = found[sizes[0].name].value if len(sizes) == 1 else None
+    if not told and isinstance(value, float) and (sizes[0].unit != "1" or _is_share(sizes[0])):
+        told = sized(sizes[0], value, "+.3g") + of_largest(name, sizes[0].name, value, largest or {})
+    return f"{title} ({told})" if told else title
+
+
+def _stated(name: str, found: Found) -> str:
+    """State of an effect, if it was found in another than the usual one; else ""."""
+    state = str(found["state"].value) if "state" in found else ""
+    usual = getattr(effects.catalogue()[name](), "state", "")
+    return "" if state == usual else state
+
+
+def in_words(found: Found) -> str:
+    """The unit that a channel is in, or the miscount of a speed; with the others that are left, and all probabilities.
+
+    >>> of = {"factor": Size(7 / 6, 8 / 7, 7 / 6, "1", ((7 / 6, 0.77), (8 / 7, 0.21)))}
+    >>> in_words(of)
+    'x7/6: 6 pole pairs set instead of 7 (0.77), or x8/7: 7 pole pairs set instead of 8 (0.21)'
+    """
+    if "factor" not in found:
+        return ""
+    factor, unit = found["factor"], found.get("unit")
+    left = [(v, p) for v, p in (unit or factor).odds or () if p >= _SEEN]
+    if len(left) < 2:
+        return _likeliest(found)
+    each = [(_of_unit(found, v) if unit else _of_speed(v), p) for v, p in left]
+    return ", or ".join(f"{words} ({p:.2f})" for words, p in each if words)
+
+
+def _likeliest(found: Found) -> str:
+    """What is likeliest of them; "" for effects that have no factor, and for a factor of 1."""
+    if "factor" not in found:
+        return ""
+    return _of_unit(found, found["unit"].value) if "unit" in found else _of_speed(found["factor"].value)
+
+
+def _of_unit(found: Found, unit: str) -> str:
+    joint = " " if unit.startswith("taken") else " of " if unit.startswith("the other") else " in "
+    return f"{_WORD[found['channel'].value]}{joint}{unit}"
+
+
+def _of_speed(factor: float) -> str:
+    known = speed_ratio(factor)
+    return "" if factor == 1.0 else f"x{factor:.3g}" if known is None else known.short
+
+
+def of_largest(name: str, parameter: str, value: float, largest: Mapping[str, float]) -> str:
+    """The same of a shifted cell, in the unit of its channel; "" for any other parameter."""
+    cls = effects.catalogue()[name]
+    if parameter != "zero" or cls.sensor not in largest:
+        return ""
+    return f" of the largest reading, {value * largest[cls.sensor]:.3g} {_UNIT[cls.sensor]}"
+
+
+def _is_share(p: Parameter) -> bool:
+    """Whether a number without a unit is a share of something."""
+    return p.unit == "1" and p.off == 0.0 and max(abs(p.low), abs(p.high)) < 1.0
+
+
+def sized(p: Parameter, value: float, form: str = ".3g") -> str:
+    """Number with its unit; a share in percent."""
+    if _is_share(p):
+        return f"{100.0 * value:{form}} %"
+    return f"{value:{form}}" if p.unit in ("1", "") else f"{value:{form}} {p.unit}"
