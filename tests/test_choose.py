@@ -316,3 +316,18 @@ def test_an_answer_says_what_stands_in_the_way(capsys: pytest.CaptureFixture[str
     assert "200 is the largest K_v that was tried" in capsys.readouterr().out
     assert main(["choose", "--mass-kg", "0.03", "--rotors", "4", "--cells", "1", "--max-diameter-in", "1.6"]) == 2
     assert "--max-diameter-in" in capsys.readouterr().err  # not the thrust, which a small rotor makes
+
+
+def test_a_motor_that_is_recommended_is_one_that_drive_does_not_call_unusual() -> None:
+    """Racers of 5 in on 4S have 2300 to 2750 rev/min/V: what is far above is not tried, a fast one is told."""
+    found = bemt.choose(10.0, 4, labels=["5x3", "5x4"])
+    first, fastest = found.table.iloc[0], found.table.loc[found.table.kv.idxmax()]
+    for pair in (first, fastest):
+        (note,) = [n for n in bemt.drive(pair.label, kv=pair.kv, cells=4).notes if "combination" in n]
+        assert "common for racing" in note
+    assert "! a fast combination, common for racing" in found.text and "even chance from" in found.text.splitlines()[0]
+    assert "--kv LOW:HIGH tries others" not in found.text
+    told = bemt.choose(10.0, 4, labels="5x3", kv=3673.0)
+    (note,) = [n for n in bemt.drive("5x3", kv=3673.0, cells=4).notes if "combination" in n]
+    assert "unusual combination" in note and f"! {note}" in told.text
+    assert "combination" not in bemt.choose(8.0, 3, labels="10x4.5", kv=(700, 1500)).text
