@@ -865,3 +865,21 @@ def test_a_throttle_is_said_and_drawn_in_percent(tmp_path: Path, monkeypatch: py
         low, high = axis.get_xlim()
         boxes = [t.label1.get_window_extent() for t in axis.xaxis.get_major_ticks() if low <= t.get_loc() <= high]
         assert all(a.x1 + 5.0 < b.x0 for a, b in itertools.pairwise(boxes))
+
+
+@pytest.mark.parametrize(("sag", "words"), [(0.925, "7.5% less"), (1.06, "6.0% more"), (0.98, "")])
+def test_the_same_thrust_per_watt_at_another_voltage_is_said_first(tmp_path: Path, sag: float, words: str) -> None:
+    """A weaker battery gives less thrust at every throttle: the propeller is not what changed."""
+    files = []
+    for name, k in (("a.csv", 1.0), ("b.csv", sag)):
+        x = k * np.linspace(0.3, 1.0, 9)
+        table = {"throttle": np.linspace(30, 100, 9), "grams": 1150.0 * x**2, "volts": np.full(9, 16.0 * k)}
+        files.append(written(tmp_path / name, table | {"amps": 42.0 * x**3 / k}))
+    answer = compare(*files)
+    first = " ".join(answer.text.partition("verdict:")[0].split())
+    assert answer.verdict == "none" and answer.effects == ()
+    if words:
+        said = f"the battery or supply of B gave {words} voltage at equal electrical power."
+        assert first.startswith("Same thrust per watt (") and first.endswith(said)
+    else:
+        assert first.startswith("No change beyond") and "voltage" not in first
