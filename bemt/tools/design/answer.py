@@ -90,6 +90,7 @@ class DriveChoice(Answered):
             what = f"{t.mass_kg:.3g} kg on {number_of(t.rotors, 'rotor')}"
         lines = [
             *self._headline(at),
+            *self._to_buy(),
             *self._at_an_end(),
             *self._fast(),
             "",
@@ -166,6 +167,17 @@ class DriveChoice(Answered):
                 + ("" if t.rest_kg is None else f", {other.propulsion_g - first.propulsion_g:+.0f} g a rotor")
             )
         return lines
+
+    def _to_buy(self) -> list[str]:
+        """Which motor on sale to take: the nearest and most usual. The least power would be that of a wrong sheet."""
+        if self.on_sale.empty:
+            return []
+        one = self.on_sale.iloc[0]
+        power, chance = _banded(one.power_W, one.u_power_W), f"{one.probability:.0%}"
+        return [
+            f"On sale is {one.motor} ({one.kv:.0f} rev/min/V): with {one.label} it meets this at {chance}, {power} W, "
+            f"{one.full_thrust_N:.3g} N at full throttle"
+        ]
 
     def _stock(self) -> list[str]:
         """Motors on sale for the first propeller, and where they come from."""
