@@ -13,6 +13,7 @@ from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.rotors.case.motor import NamedMotor
 from bemt.rotors.propeller import rotor_of
+from bemt.tools.design import motors_file
 from bemt.tools.design.answer import best_of_each
 from bemt.tools.design.motors_file import KnownMotor, read_motors
 from bemt.tools.design.search import POWER_BAND
@@ -272,6 +273,9 @@ def test_motors_on_sale_are_named_where_their_list_is_installed() -> None:
         assert row["peak_A"] <= row["max_current_A"] and row["asked_N"] <= row["full_thrust_N"]
         assert row["motor"] in found.text
     assert "Apache-2.0" in found.text and found.to_dict()["on_sale"][0]["motor"] == stock[0]["motor"]
+    usual = stock[0]  # the one to buy: the K_v of the first line is hardly on sale
+    (buy,) = [line for line in found.text.splitlines() if line.startswith("On sale is ")]
+    assert found.text.splitlines().index(buy) <= 2 and f"{usual['motor']} ({usual['kv']:.0f} rev/min/V)" in buy
     light, heavy = sorted(stock, key=lambda row: row["motor_g"])[:: len(stock) - 1]
     more = 1e-3 * 9.80665 * (heavy["motor_g"] - light["motor_g"])  # each lifts itself
     assert heavy["at_N"] - light["at_N"] == pytest.approx(more, rel=0.1)
@@ -316,3 +320,34 @@ def test_an_answer_says_what_stands_in_the_way(capsys: pytest.CaptureFixture[str
     assert "200 is the largest K_v that was tried" in capsys.readouterr().out
     assert main(["choose", "--mass-kg", "0.03", "--rotors", "4", "--cells", "1", "--max-diameter-in", "1.6"]) == 2
     assert "--max-diameter-in" in capsys.readouterr().err  # not the thrust, which a small rotor makes
+
+
+def test_a_motor_that_is_recommended_is_one_that_drive_does_not_call_unusual() -> None:
+    """Racers of 5 in on 4S have 2300 to 2750 rev/min/V: what is far above is not tried, a fast one is told."""
+    found = bemt.choose(10.0, 4, labels=["5x3", "5x4"])
+    first, fastest = found.table.iloc[0], found.table.loc[found.table.kv.idxmax()]
+    for pair in (first, fastest):
+        (note,) = [n for n in bemt.drive(pair.label, kv=pair.kv, cells=4).notes if "combination" in n]
+        assert "common for racing" in note
+    assert "! a fast combination, common for racing" in found.text and "even chance from" in found.text.splitlines()[0]
+    assert "--kv LOW:HIGH tries others" not in found.text
+    told = bemt.choose(10.0, 4, labels="5x3", kv=3673.0)
+    (note,) = [n for n in bemt.drive("5x3", kv=3673.0, cells=4).notes if "combination" in n]
+    assert "unusual combination" in note and f"! {note}" in told.text
+    assert "combination" not in bemt.choose(8.0, 3, labels="10x4.5", kv=(700, 1500)).text
+
+
+def test_the_motor_to_buy_is_named_beside_the_ideal_constant(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The nearest of those on sale, above the table; without any, nothing."""
+    asked: dict[str, Any] = {"thrust_N": 8.0, "cells": 3, "labels": "10x4.5", "kv": (700, 1500)}
+    first = choose(**asked).iloc[0]
+    offers = [KnownMotor(f"Maker {k} {first.kv * k:.0f}", first.kv * k, 0.12, 0.8, first.motor_g, 90.0, f"M{k}")
+              for k in (1.0, 1.05)]  # fmt: skip
+    monkeypatch.setattr(motors_file, "on_sale", lambda *_: offers)
+    found = bemt.choose(**asked)
+    best = found.on_sale.iloc[0]
+    (buy,) = [line for line in found.text.splitlines()[:4] if line.startswith("On sale is ")]
+    assert len(found.on_sale) == 2 and f"{best.motor} ({best.kv:.0f} rev/min/V)" in buy
+    assert f"{best.full_thrust_N:.3g} N at full throttle" in buy
+    monkeypatch.setattr(motors_file, "on_sale", lambda *_: [])
+    assert "On sale is" not in bemt.choose(**asked).text

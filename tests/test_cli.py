@@ -203,6 +203,13 @@ WRONG = [
     (["estimate", "10x5", "--rpm", "6000", "--airspeed-kmh", "30"], "Did you mean --airspeed-km-h?"),
     (["estimate", "10x5", "--rpm", "6000", "--airspeed-furlong", "30"], "Did you mean --airspeed-m-s?"),
     (["new", "10x5", "--pitch-in", "5"], "--pitch-in 5. The pitch is in the label"),
+    (
+        ["estimate", "10x4.5", "--kv", "920", "--cells", "3"],
+        "required: --rpm. Got --kv, --cells. With a motor and a battery: bemt drive 10x4.5 --kv 920 --cells 3.",
+    ),
+    (["drive", "70mm", "--fan", "--blades", "11"], "--fan: A fan is a case: bemt new 70mm --fan --blades 11, then"),
+    (["diagnose", "a.csv", "--case", "c", "--temperature-C", "12"], "State --density-kg-m3 1.19, or temperature_C"),
+    (["compare", "a.csv", "b.csv", "--density-kg-m3", "1.2"], "Each run has its own: --air-a 1.19kg/m3,5m/s."),
     (["estimate", "10x5", "--rpm", "6k"], "--rpm: got 6k; expected a number, without its unit"),
     (["estimate", "cases", "--rpm", "6000"], "bemt sweep cases"),
     (["new", "10x5", "--kv", "2300", "--cells", "33"], "--kv, --cells: got 2300 rev/min/V on 33 cells"),

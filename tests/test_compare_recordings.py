@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import re
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.data.recordings.load import import_file
+from bemt.judge.compare import first_picture
 from bemt.judge.compare.change_document import document, text
 from bemt.judge.compare.drive_laws import LAWS
 from bemt.judge.compare.first_picture import picture
@@ -879,3 +881,43 @@ def test_the_quick_look_comes_first_and_nobody_is_asked_for_what_he_would_have_s
     assert {"propeller", "section"} <= set(answer.effects)
     assert told.startswith(known["propeller"].check) and known["section"].check not in told
     assert known["coaxial_neighbour"].check not in told
+
+
+def test_a_throttle_is_said_and_drawn_in_percent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As both files have it; beside a pulse width it is one, and labels of five digits stay apart."""
+    files, throttle = [], np.linspace(30.0, 100.0, 8)
+    for name, gain in (("a.csv", 1.0), ("b.csv", 0.87), ("c.csv", 0.87)):
+        command = {"Throttle (%)": throttle} if name != "c.csv" else {"PWM (us)": 1000.0 + 10.0 * throttle}
+        table = command | {"Thrust (g)": gain * 0.11 * throttle**2}
+        files.append(written(tmp_path / name, table))
+        written(tmp_path / f"rpm_{name}", table | {"rpm": 280.0 * throttle})
+    said = compare(files[0], files[1]).text
+    assert "at equal command, 30% to 100%:" in said and "µs" not in said
+    assert "at equal command, 1300 to 2000 µs:" in compare(files[0], files[2]).text
+    drawn = []
+    monkeypatch.setattr(first_picture.canvas, "png", lambda figure, *_: drawn.append(figure) or b"")
+    compare(str(tmp_path / "rpm_a.csv"), str(tmp_path / "rpm_b.csv")).picture()
+    drawn[0].canvas.draw()
+    assert {"throttle [%]", "speed of rotation [rev/min]"} == {axis.get_xlabel() for axis in drawn[0].axes}
+    for axis in drawn[0].axes:
+        low, high = axis.get_xlim()
+        boxes = [t.label1.get_window_extent() for t in axis.xaxis.get_major_ticks() if low <= t.get_loc() <= high]
+        assert all(a.x1 + 5.0 < b.x0 for a, b in itertools.pairwise(boxes))
+
+
+@pytest.mark.parametrize(("sag", "words"), [(0.925, "7.5% less"), (1.06, "6.0% more"), (0.98, "")])
+def test_the_same_thrust_per_watt_at_another_voltage_is_said_first(tmp_path: Path, sag: float, words: str) -> None:
+    """A weaker battery gives less thrust at every throttle: the propeller is not what changed."""
+    files = []
+    for name, k in (("a.csv", 1.0), ("b.csv", sag)):
+        x = k * np.linspace(0.3, 1.0, 9)
+        table = {"throttle": np.linspace(30, 100, 9), "grams": 1150.0 * x**2, "volts": np.full(9, 16.0 * k)}
+        files.append(written(tmp_path / name, table | {"amps": 42.0 * x**3 / k}))
+    answer = compare(*files)
+    first = " ".join(answer.text.partition("verdict:")[0].split())
+    assert answer.verdict == "none" and answer.effects == ()
+    if words:
+        said = f"the battery or supply of B gave {words} voltage at equal electrical power."
+        assert first.startswith("Same thrust per watt (") and first.endswith(said)
+    else:
+        assert first.startswith("No change beyond") and "voltage" not in first

@@ -463,3 +463,21 @@ def test_a_kitchen_scale_is_a_thrust_and_without_a_speed_what_works_is_named(
 def test_a_measured_propeller_is_said_to_be_fitted_to_its_measurement(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["estimate", "APC 10x5E", "--rpm", "6000"]) == 0
     assert "fitted to its measurement in the UIUC" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("speed", ["", ";rpm"])
+def test_two_propellers_in_one_file_are_compared_by_the_rows_of_each(
+    speed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    rows = [(50, 376, "HQ 5x4"), (75, 730, "HQ 5x4"), (100, 1148, "HQ 5x4"),
+            (50, 323, "Gemfan"), (75, 640, "Gemfan"), (100, 996, "Gemfan")]  # fmt: skip
+    lines = [f"{t};{g};{name}" + (f";{90 * t}" if speed else "") for t, g, name in rows]
+    Path("my both.csv").write_text("\n".join([f"Throttle %;Thrust (g);Prop{speed}", *lines]) + "\n")
+    step = "bemt compare 'my both.csv' 'my both.csv' --rows-a 'Prop=HQ 5x4' --rows-b Prop=Gemfan"
+    assert main(["import", "my both.csv"]) == 0
+    assert f"Next: {step}" in capsys.readouterr().out
+    assert main(["compare", "my both.csv"]) == 2
+    assert step in capsys.readouterr().err
+    assert main(shlex.split(step)[1:]) in (0, 1)
+    assert "thrust -1" in capsys.readouterr().out.splitlines()[0]

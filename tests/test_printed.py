@@ -225,6 +225,34 @@ def test_the_command_writes_both_hands_and_a_3mf_of_the_same_body(tmp_path: Path
     assert unit == "mm" and packed.volume == pytest.approx(other.volume, rel=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("words", "hole", "turns", "hand"),
+    [
+        ([], "the hub is solid, without a hole for the shaft: --bore-mm 5, or --adapter ring, m3", "CCW", "right"),
+        (["--bore-mm", "4", "--hand", "left"], "hole for the shaft: 4 mm\n", "hand: clockwise (CW) seen from", "left"),
+        (["--adapter", "m5", "--hand", "both"], "5.2 mm; a hexagon for a nut in the back, 8.2 mm wide and 4.9 mm deep",
+         "_right turns counterclockwise (CCW)", "both"),
+    ],
+)  # fmt: skip
+def test_the_terminal_says_the_hole_for_the_shaft_and_the_hand(
+    words: list[str], hole: str, turns: str, hand: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A hub without a hole fits no motor, and the wrong hand blows the wrong way."""
+    out = tmp_path / "made"
+    assert main(["export", "8x5", "--out", str(out), "--printable", "--format", "stl", *words]) == 0
+    said = capsys.readouterr().out
+    assert hole in said and turns in said
+    told = json.loads((out / "manifest.json").read_text())["printed"]
+    assert told["hand"] == hand
+    for file in out.glob("*.stl"):
+        vertices, _, _ = read_solid(file)  # mm
+        least = np.hypot(vertices[:, 0], vertices[:, 1]).min()
+        if "bore_mm" not in told:
+            assert hole.startswith("the hub is solid")
+        else:
+            assert least == pytest.approx(0.5 * told["bore_mm"], rel=0.01)
+
+
 @pytest.mark.parametrize("words", [["--bore-mm", "5"], ["--printable", "--format", "openfoam"],
                                    ["--printable", "--min-thickness-mm", "0.01"]])  # fmt: skip
 def test_options_that_say_nothing_are_refused(words: list[str], tmp_path: Path, project: Path) -> None:

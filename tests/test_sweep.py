@@ -503,7 +503,7 @@ def test_cases_of_one_name_are_told_apart_and_remarks_are_whole_in_a_pipe(
 
 def test_no_flag_is_dropped_from_the_screen() -> None:
     row = {"source": "bemt", "label": "bemt", "u": 0.5, "airspeed_m_s": 0.0, "rpm": 6000.0, "thrust_N": 1.0}
-    kinds = ("outside the measured rotors", "not converged", "supersonic tip")
+    kinds = ("beyond what was measured", "not converged", "supersonic tip")
     flags = [f"{kind}: {i} {'and so on ' * 9}" for i, kind in enumerate(kinds * 5)]
     results = [
         {"name": f"case_{i}", "rows": [{**row, "flags": [flag]}], "faults": [], "assumptions": [], "audit": [],
@@ -516,7 +516,7 @@ def test_no_flag_is_dropped_from_the_screen() -> None:
     counted = [int(n) for n in re.findall(r"(\d+) more: ", words)]
     whole = [flag for flag in flags if flag.split(" and ")[0] + " and so on" in words]
     assert len(whole) + sum(counted) == len(flags) and all(kind in words for kind in kinds)
-    assert words.index("not converged") < words.index("outside the measured rotors")
+    assert words.index("not converged") < words.index("beyond what was measured")
 
 
 def test_a_flagged_point_is_no_plain_agreement() -> None:

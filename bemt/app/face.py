@@ -10,7 +10,7 @@ import argparse
 import inspect
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any, cast
@@ -130,11 +130,18 @@ class Parser(argparse.ArgumentParser):
         known, extra = self.parse_known_args(args, namespace)
         if extra:
             unknown = dict.fromkeys(word.partition("=")[0] for word in extra if word.startswith("-"))
-            near = {w: self._meant(w) for w in unknown}
-            words = [f" {w}: {hint}" if len(unknown) > 1 else f" {hint}" for w, hint in near.items() if hint]
+            hints = self._hints(unknown)
+            words = [f" {', '.join(of)}: {hint}" if len(unknown) > 1 else f" {hint}" for hint, of in hints if hint]
             words += [" Quotes keep words together."] if not extra[0].startswith("-") else []
             self.error(f"unrecognized arguments: {' '.join(extra)}." + "".join(words))
         return known
+
+    def _hints(self, unknown: Iterable[str]) -> list[tuple[str, list[str]]]:
+        """What to say of unknown options, a hint once with all that it is for; "" where there is none."""
+        hints: dict[str, list[str]] = {}
+        for word in unknown:
+            hints.setdefault(self._meant(word), []).append(word)
+        return list(hints.items())
 
     def _meant(self, word: str) -> str:
         """Where the quantity of an unknown option is given, else the nearest option."""
@@ -142,14 +149,15 @@ class Parser(argparse.ArgumentParser):
 
         of = split_suffix(word[2:].replace("-", "_"))[0]
         options = [option for action in self._actions for option in action.option_strings]
-        return self.elsewhere.get(of) or did_you_mean(word, options, 1).strip()
+        return self.elsewhere.get(word) or self.elsewhere.get(of) or did_you_mean(word, options, 1).strip()
 
     def error(self, message: str) -> Any:
         """Say what is wrong in the words of the project, with the nearest option."""
         if message.startswith("the following arguments are required"):
             options = [option for action in self._actions for option in action.option_strings]
             typed = [word.partition("=")[0] for word in self._words if word.startswith("--")]
-            message += "".join(f". Got {w}. {self._meant(w)}".rstrip(" .") for w in typed if w not in options)
+            hints = self._hints(w for w in typed if w not in options)
+            message += "".join(f". Got {', '.join(of)}. {hint}".rstrip(" .") for hint, of in hints)
             message += f"{'.'[message.endswith('?') :]} As in: {self.like}" if self.like else ""
         number = re.match(r"argument (.+?): invalid (number|count|cells) value: '(.*)'$", message)
         if number:

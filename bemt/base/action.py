@@ -42,7 +42,9 @@ class Declaration:
     words: tuple[str, ...] = ()  # parameters that are bare words
     common: tuple[str, ...] = ()  # parameters that people use; the rest stands in --help-all
     shown: bool = False  # among the commands of `bemt --help`; the others stand under `bemt lab`
-    elsewhere: Mapping[str, str] = field(default_factory=dict)  # quantities looked for here, and where they are
+    elsewhere: Mapping[str, str] = field(
+        default_factory=dict
+    )  # quantities, or options, looked for here, and where they are
 
 
 class Answered:

@@ -28,7 +28,10 @@ _ELSEWHERE = {
 @action(
     "Propellers and fans", "estimate 10x5 --rpm 6000", words=("label",), shown=True,
     common=("rpm", "airspeed_m_s", "blades", "chord_mm", "series", "reading", "angle_deg"),
-    elsewhere=_ELSEWHERE,
+    elsewhere=_ELSEWHERE | dict.fromkeys(
+        ("motor", "kv", "cells", "mass", "rotors", "capacity"),
+        "With a motor and a battery: bemt drive 10x4.5 --kv 920 --cells 3.",
+    ),
 )  # fmt: skip
 def estimate(
     label: str, rpm: ArrayLike, airspeed_m_s: ArrayLike = 0.0, *, blades: Count | None = None,

@@ -55,13 +55,13 @@ SAID = 1.01
 DOUBTFUL = 2.5
 """Factor from which a point is called one not to be trusted, declared [1]."""
 
-OUTSIDE, DOUBT = "outside the measured rotors", "do not trust it"
+OUTSIDE, DOUBT = "beyond what was measured", "do not trust it"
 
 
 def serious(flags: Sequence[str]) -> tuple[str, ...]:
     """Flags that forbid to call a point one that agrees, without their numbers; a band that is a little wider does not.
 
-    >>> serious(["supersonic tip: Mach 1.09", "outside the measured rotors: 5 blades (2 to 4): model error times 1.1"])
+    >>> serious(["supersonic tip: Mach 1.09", "beyond what was measured: 5 blades (rotors 2 to 4)"])
     ('supersonic tip',)
     """
     return tuple(kind(f) for f in flags if not f.startswith(OUTSIDE) or f.endswith(DOUBT))
@@ -162,13 +162,12 @@ class Validity:
         said: list[tuple[str, ...]] = [()] * P
         for i in np.flatnonzero(np.max(more, axis=0) > SAID**2 - 1.0).tolist():
             why = [
-                f"{text.format(_three(float(np.broadcast_to(value, P)[i])))} ({known})"
+                f"{text.format(_three(float(np.broadcast_to(value, P)[i])))} (rotors {known})"
                 for part, (_, text, value, known) in zip(more, parts, strict=True)
                 if part[i] > SAID**2 - 1.0
             ]
             doubt = f"; {DOUBT}" if factor[i] >= DOUBTFUL else ""
-            words = f"{OUTSIDE}: {', '.join(why)}: model error times {factor[i]:.3g}{doubt}"
-            said[i] = (words,)
+            said[i] = (f"{OUTSIDE}: {', '.join(why)}, so that {_wider(float(factor[i]))}{doubt}",)
         return np.asarray(factor, dtype=float), tuple(said)
 
 
@@ -185,6 +184,16 @@ def _folds(value: ArrayLike, known: tuple[float, float]) -> Array:
     """E-folds by which a value lies outside its range."""
     v = np.maximum(np.asarray(value, dtype=float), 1e-12)
     return np.asarray(np.log(np.maximum(np.maximum(known[0] / v, v / known[1]), 1.0)))
+
+
+def _wider(factor: float) -> str:
+    """What a factor on the model's own error means.
+
+    >>> _wider(1.04), _wider(2.6)
+    ("the model's own uncertainty is 4 % wider", "the model's own uncertainty is 2.6 times as wide")
+    """
+    size = f"{1e2 * (factor - 1.0):.0f} % wider" if factor < 2.0 else f"{factor:.3g} times as wide"
+    return f"the model's own uncertainty is {size}"
 
 
 def _three(value: float) -> float:

@@ -325,6 +325,15 @@ def pulse_of(throttle: Array) -> Array:
     return 1e-3 + 1e-3 * throttle
 
 
+def throttle_of(pulse_s: Array) -> Array:
+    """Throttle that `pulse_of` made a pulse width of, (N,) [1].
+
+    >>> throttle_of(pulse_of(np.array([0.25])))
+    array([0.25])
+    """
+    return (pulse_s - 1e-3) * 1e3
+
+
 def without_unit(d: Dataset) -> frozenset[str]:
     """Loads that a series tells by coefficients alone: no unit can be wrong there."""
     told, loads = d.values.keys(), {"thrust_N": {"thrust_N"}, "torque_Nm": {"torque_Nm", "power_W"}}

@@ -56,6 +56,16 @@ def options_of(told: Mapping[str, Sequence[str | float]], *only: str) -> list[st
             for word in (f"--{name}", *values)]  # fmt: skip
 
 
+def between_setups(record: Dataset, path: str) -> list[str]:
+    """Words of `compare` for the first two set-ups that a column of text tells apart in one file; none without."""
+    from bemt.data.readers.generic_csv import setups
+
+    for name, (one, two, *_) in setups(record.texts).items():
+        file = shlex.quote(path)
+        return [file, file, *options_of({"rows-a": [f"{name}={one}"], "rows-b": [f"{name}={two}"]})]
+    return []
+
+
 def reduction_document(reduced: Dataset | str | None) -> dict[str, Any] | None:
     """The part of the JSON document that holds the steady points."""
     if reduced is None:
@@ -318,6 +328,9 @@ class Imported:
         loaded = [path for path, _, known in read if "rpm" in {*known, *said}]
         alone = [path for path, kind, _ in read if kind == "bench"]
         how = options_of(said, "unit", "column", "sign")
+        one = self.files[0].record if len(read) == len(self.files) == 1 else None
+        if words := between_setups(one, self.files[0].path) if one else []:
+            return [f"Next: {' '.join(['bemt compare', *words, *how])}\n"]
         if alone and not loaded:
             pair = " ".join(["bemt compare", *(alone if len(alone) == 2 else [alone[0], "ANOTHER_RUN"]), *how])
             return [f"Next: {pair}   (beside a model: a column headed rpm, the speed of every row)\n"]

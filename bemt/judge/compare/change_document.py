@@ -287,6 +287,8 @@ def headline(doc: ComparedRuns) -> str:
     """What an engineer would say first."""
     effects, verdict = list(doc.effects), doc.verdict
     moved = _moved(doc)
+    if verdict == "none" and doc.rule.endswith(recordings.ONLY_VOLTS):
+        return f"Same thrust per watt ({moved}); {doc.rule}."
     if verdict == "none":
         return f"No change beyond the difference between two set-ups ({moved or 'drive only'})."
     if verdict == "unknown":

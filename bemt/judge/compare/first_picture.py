@@ -242,9 +242,11 @@ _AXIS = {
     "electrical_power_W": "electrical power / n³ [W s³]", "rpm": "speed of rotation [rev/min]",
     "voltage_V": "voltage [V]",
 }  # fmt: skip
-_COMMAND = {"pwm_s": ("pulse width [µs]", 1e6), "throttle": ("throttle [-]", 1.0)}
+_COMMAND = {"pwm_s": ("pulse width [µs]", 1e6), "throttle": ("throttle [%]", 100.0)}
 # Speeds that vary by less than this share are one.
 _STEADY = 0.05
+# Intervals of the abscissa at most: labels of five digits stay apart.
+_TICKS = 6
 # Characters in a line of the title.
 _TITLE_WIDE = 110
 
@@ -296,7 +298,8 @@ def _axis(change: RunChange, c: MatchedChannel) -> tuple[str, Callable[[Array], 
     if _along(c):
         return _advance(change)[0], lambda x: x
     if c.name in OVER_COMMAND:
-        label, factor = _COMMAND[change.a.command]
+        both = change.a.by_throttle and change.b.by_throttle
+        label, factor = _COMMAND["throttle" if both else change.a.command]
         return label, lambda x: x * factor
     return "electrical power [W]" if c.name == "at_power" else _AXIS["rpm"], np.exp
 
@@ -334,6 +337,7 @@ def _readings(axis: Any, change: RunChange, c: MatchedChannel) -> None:
     axis.set_ylabel(own_label if bare else _AXIS.get(c.channel, c.channel))
     axis.set_xlabel(label)
     axis.legend(loc="best")
+    axis.locator_params(axis="x", nbins=_TICKS)
     axis.ticklabel_format(axis="y", style="sci", scilimits=(-2, 4))
 
 
@@ -366,3 +370,4 @@ def _ratio(axis: Any, change: RunChange, c: MatchedChannel) -> None:
     axis.set_ylabel(f"{word}: B / A")
     axis.set_xlabel(label)
     axis.legend(loc="best")
+    axis.locator_params(axis="x", nbins=_TICKS)

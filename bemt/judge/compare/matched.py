@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.data.recordings import cfd_setup
-from bemt.data.recordings.channels import in_one_step, moves, named
+from bemt.data.recordings.channels import THROTTLE_IS_PULSE, in_one_step, moves, named, throttle_of
 from bemt.data.recordings.reduce import reduce, reduction
 from bemt.judge.compare.selection import COLD, HOT, LOAD_CHANNELS, conditions_of, one_rotor, speed_in_doubt, wind_of
 from bemt.physics.dataset import DIMENSIONLESS, Dataset
@@ -54,6 +54,7 @@ class StandRun:
     misread: tuple[int, int] = (0, 0)  # Speeds that no rotor can have at their command or load, and all
     # Speed below which thrust is negative as in a wind that is not recorded [rev/min]; NaN: no such wind
     zero_thrust_rpm: float = math.nan
+    by_throttle: bool = False  # Whether the pulse width is only what a throttle stands for
     setup: cfd_setup.Conditions = field(default_factory=dict)  # How a run of CFD was computed, as far as it says
 
     def __len__(self) -> int:
@@ -92,7 +93,9 @@ def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> 
         constant["diameter_m"] if diameter_m is None else diameter_m, float(warm.mean()) if warm.size else math.nan,
         {k: float(v["session"]) for k, v in reduction(series).correlated.items() if v.get("session")},
         conditions_of(imported), _shifts(series, bool(ramp)), (int(false.sum()) + gone, every + gone),
-        math.nan if (zero := wind_of(imported)) is None else zero, cfd_setup.stated_setup(imported),
+        math.nan if (zero := wind_of(imported)) is None else zero,
+        command == "pwm_s" and any(note.endswith(THROTTLE_IS_PULSE) for note in series.notes),
+        cfd_setup.stated_setup(imported),
     )  # fmt: skip
 
 
@@ -249,7 +252,7 @@ class MatchedChannel:
     channel: str  # Name of the reading
     # (N,) logarithm of the reading over its power of the speed, and over the density where both recordings tell it [1]
     y: Array
-    x: Array  # (N, 2) ln rpm or the command, and advance ratio or advance per turn [m]
+    x: Array  # (N, 2) ln rpm or pulse width [s] or throttle [1], and advance ratio or advance per turn [m]
     second: NDArray[np.bool_]  # (N,) whether a point is of B
     run: NDArray[np.intp]  # (N,) runs, numbered through
     floor: Array  # (N,) largest reading over this one [1]
@@ -385,6 +388,8 @@ def matched(a: StandRun, b: StandRun, name: str, diameter: float) -> MatchedChan
     notes += [f"{channel}: {part.lost} of {len(run)} points of {letter} left out: near zero"
               for part, run, letter in ((one, a, "A"), (two, b, "B")) if part.lost > 0.5 * len(run)]  # fmt: skip
     one, two = _averaged(one), _averaged(two)
+    if name in OVER_COMMAND and a.by_throttle and b.by_throttle:  # as both were typed
+        one, two = (replace(part, x=np.column_stack([throttle_of(part.x[:, 0]), part.x[:, 1]])) for part in (one, two))
     log_density, unsure = density_change(a, b) if name in LOADS and channel not in _COEFFICIENTS else (0.0, 0.0)
     runs, more = (np.unique(part.run, return_inverse=True)[1] for part in (one, two))
     seen = [run.session.get(channel, 0.0) for run in (a, b)]

@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.tables import number_of, some
 from bemt.base.units import ZERO_CELSIUS
@@ -46,7 +47,9 @@ NOTHING_SHARED = "the two runs have no common speed and advance ratio"
 """Reason where every ratio would be one of two extrapolations."""
 IN_WIND = "as in wind, and no airspeed is recorded"
 """End of the reason where one recording shows a wind that it does not state."""
-NO_SPEED = "without the speed rotor, motor and scale look alike"
+ONLY_VOLTS = " voltage at equal electrical power"
+"""End of the reason where thrust per watt is the same and the voltage is not."""
+NO_SPEED = "without the speed, rotor, motor and scale look alike"
 """Reason where thrust was compared at equal power or command."""
 OTHER_STAND = "no change on one stand moves every load by this much: check units and speeds of both files"
 
@@ -75,7 +78,25 @@ class RunChange:
         # a cut blade takes less power, and gives as much thrust for it: at one command both are less
         P = min((drive_laws.weigh_factor(c, scatter) for c, scatter in self._bare), key=lambda P: P[NONE])
         said = decide(P)
+        if said.leading == NONE and (volts := self._volts_at_power):
+            said = replace(said, why=f"{volts}{ONLY_VOLTS}")
         return Judgement.of(replace(said, why=self.no_speed) if said.by == "files" else said, P)
+
+    @property
+    def _volts_at_power(self) -> str:
+        """What the voltage of B differs by at equal electrical power, where it does and both tell; else ""."""
+        runs = [run.points.values for run in (self.a, self.b)]
+        if "at_power" not in self.rotor.channels or not all("voltage_V" in v for v in runs):
+            return ""
+        (P, V), (P_b, V_b) = (_by_power(v["electrical_power_W"], v["voltage_V"]) for v in runs)
+        shared = P_b[(P_b >= P[0]) & (P_b <= P[-1])] if P.size and P_b.size else P[:0]
+        if not shared.size:
+            return ""
+        moved = float(np.median(np.log(np.interp(shared, P_b, V_b) / np.interp(shared, P, V))))
+        if abs(moved) < drive_laws.TOLD_VOLTAGE:
+            return ""
+        size = f"{abs(math.expm1(moved)):.1%} {'less' if moved < 0.0 else 'more'}"
+        return f"the battery or supply of B gave {size}"
 
     @cached_property
     def _bare(self) -> list[tuple[MatchedChannel, fits.Scatter]]:
@@ -241,6 +262,13 @@ class RunChange:
     def turned(self) -> bool:
         """Whether thrust has the other sign in B."""
         return any(c.turned for c in self.channels.values() if c.name == "thrust")
+
+
+def _by_power(power_W: Array, volts: Array) -> tuple[Array, Array]:
+    """Both where they are positive, in the order of the power."""
+    good = (power_W > 0.0) & (volts > 0.0)
+    order = np.argsort(power_W[good], kind="stable")
+    return power_W[good][order], volts[good][order]
 
 
 def changed(a: StandRun, b: StandRun, diameter_m: float, judge: Callable[[RunChange], Judgement]) -> RunChange:

@@ -23,7 +23,8 @@ from bemt.base.units import INCH
 from bemt.data.readers.left_open import one_step
 from bemt.data.recordings.channels import named
 from bemt.data.recordings.check import OPEN_OR_OUT, check, left_out
-from bemt.data.recordings.load import as_stated, import_file, one_as_stated, stated_options
+from bemt.data.recordings.load import as_stated, import_file, is_measured, one_as_stated, stated_options
+from bemt.data.recordings.shown import between_setups, options_of
 from bemt.judge.compare import one_run, two_runs
 from bemt.judge.compare.change_document import DIAGNOSED, ComparedRuns, RankedCause, document, next_step, text
 from bemt.judge.compare.matched import stand_run
@@ -173,7 +174,9 @@ def compared(
     tables = is_table(a) or is_table(b)
     if b is None:
         if case is None:
-            hint = "Two recordings, A B, need none"
+            inside = between_setups(one_as_stated(a, run or {}), a) if is_measured(a) else []
+            pair = " ".join(["bemt compare", *inside, *options_of(stated_options(run or {}))])
+            hint = f"Two set-ups of this file: {pair}" if inside else "Two recordings, A B, need none"
             raise InputError(Fault("--case", "", "one recording and no case", "the case to compare it with", hint))
         typed = "" if is_table(a) else os.fspath(a)
         one = one_run.compare_run(as_stated([a], run or {})[0], case, progress, file=typed)

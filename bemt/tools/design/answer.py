@@ -11,7 +11,8 @@ from bemt.base import canvas
 from bemt.base.action import Answered
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
 from bemt.base.tables import csv_text, json_text, number_of, number_text, text_table, write_atomic
-from bemt.rotors.case.motor import LIST, motors_on_sale
+from bemt.base.units import INCH
+from bemt.rotors.case.motor import LIST, fast_words, motors_on_sale
 from bemt.tools.design.search import SOC_END, Target
 
 if TYPE_CHECKING:
@@ -89,7 +90,9 @@ class DriveChoice(Answered):
             what = f"{t.mass_kg:.3g} kg on {number_of(t.rotors, 'rotor')}"
         lines = [
             *self._headline(at),
+            *self._to_buy(),
             *self._at_an_end(),
+            *self._fast(),
             "",
             f"{what}{pair} on {t.cells}S at 50% charge{size}{fluid}, tip Mach up to {t.max_tip_mach:g}: "
             f"{good} of {len(self.table)} pairs meet it with a probability of {self.sure:.0%} or more",
@@ -126,21 +129,31 @@ class DriveChoice(Answered):
         kvs = self.table.kv
         for end, word in ((kvs.max(), "largest"), (kvs.min(), "smallest")):
             if self.target.sized and kvs.nunique() > 1 and kvs.iloc[0] == end:
+                if word == "largest" and self._fast():
+                    return []  # no faster one is for this propeller
                 return [f"{end:.0f} is the {word} K_v that was tried: --kv LOW:HIGH tries others"]
         return []
+
+    def _fast(self) -> list[str]:
+        """What `drive` says of the first pair, where it is a fast one."""
+        t, first = self.target, self.table.iloc[0]
+        if t.fan or t.use.fluid != "air":
+            return []
+        words = fast_words(first.kv, t.loaded_V, f"{t.cells}S", first.diameter_in * INCH)
+        return [f"! {words}"] if words else []
 
     def _headline(self, at: str) -> list[str]:
         """What to take, and what the least power would be; else the nearest."""
         table, first, t = self.table, self.table.iloc[0], self.target
+        same = table[(table.label == first.label) & (table.probability >= 0.5)]
+        even = f" (an even chance from {same.kv.min():.0f})" if same.kv.min() < first.kv else ""
         if not len(self.good) and first.probability > 0.0:
             return [f"none meets it with a probability of {self.sure:.0%}; nearest is {first.label} with "
-                    f"{first.kv:.0f} rev/min/V at {first.probability:.0%} ({first.why})"]  # fmt: skip
+                    f"{first.kv:.0f} rev/min/V{even} at {first.probability:.0%}: {first.why}"]  # fmt: skip
         if not len(self.good):
             reach = table.loc[table.full_thrust_N.idxmax()]
             most = f"{reach.full_thrust_N:.3g} N, with {reach.label} at {reach.kv:.0f} rev/min/V"
             return [f"none meets it; the most is {most if reach.full_thrust_N > 0.0 else 'no thrust at all'}"]
-        same = table[(table.label == first.label) & (table.probability >= 0.5)]
-        even = f" (an even chance from {same.kv.min():.0f})" if same.kv.min() < first.kv else ""
         lines = [
             f"Take {first.label} with {first.kv:.0f} rev/min/V{even}: {_banded(first.power_W, first.u_power_W)} W at "
             f"{at}, {first.g_per_W:.3g} g/W" + (f", but it {first.why}" if first.why else "")
@@ -154,6 +167,17 @@ class DriveChoice(Answered):
                 + ("" if t.rest_kg is None else f", {other.propulsion_g - first.propulsion_g:+.0f} g a rotor")
             )
         return lines
+
+    def _to_buy(self) -> list[str]:
+        """Which motor on sale to take: the nearest and most usual. The least power would be that of a wrong sheet."""
+        if self.on_sale.empty:
+            return []
+        one = self.on_sale.iloc[0]
+        power, chance = _banded(one.power_W, one.u_power_W), f"{one.probability:.0%}"
+        return [
+            f"On sale is {one.motor} ({one.kv:.0f} rev/min/V): with {one.label} it meets this at {chance}, {power} W, "
+            f"{one.full_thrust_N:.3g} N at full throttle"
+        ]
 
     def _stock(self) -> list[str]:
         """Motors on sale for the first propeller, and where they come from."""

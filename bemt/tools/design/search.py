@@ -36,7 +36,7 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.units import G0, INCH
 from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V
-from bemt.rotors.case.motor import SCATTER, SCATTER_MASS, class_resistance
+from bemt.rotors.case.motor import SCATTER, SCATTER_MASS, class_resistance, fastest_kv
 from bemt.rotors.case.unknowns import DRIVE, ESC_DROP
 from bemt.tools.design import motors_file, rotor_loads
 from bemt.tools.design.motors_file import KnownMotor
@@ -119,6 +119,18 @@ class Target:
         return self.cells * float(np.interp(SOC, LIPO_SOC, LIPO_V))
 
     @property
+    def loaded_V(self) -> float:
+        """Voltage of a typical battery at `SOC` and full throttle."""
+        return float((1.0 - SHARES["sag"].value) * self.voc)
+
+    def suited(self, diameter_in: float, machines: Sequence[KnownMotor]) -> tuple[KnownMotor, ...]:
+        """Motors tried by their K_v that turn no tip faster than those with a propeller do; all, if none or if told."""
+        if not self.sized or self.fan or self.use.fluid != "air":
+            return tuple(machines)
+        most = fastest_kv(self.loaded_V, diameter_in * INCH)
+        return tuple(m for m in machines if m.kv <= most) or tuple(machines)
+
+    @property
     def sizes_in(self) -> Sequence[float]:
         """Standard diameters, smallest first. [in]"""
         if self.fan:
@@ -167,7 +179,10 @@ def choose(
     near = [rotor_loads.nearest(one, spreads) for one in loads]
 
     def ranked(lifting: Target, draws: int = DRAWS) -> pd.DataFrame:
-        found = (_rows(one, u, machines, lifting, draws) for one, u in zip(loads, near, strict=True))
+        found = (
+            _rows(one, u, target.suited(one.diameter_m / INCH, machines), lifting, draws)
+            for one, u in zip(loads, near, strict=True)
+        )
         return _ranked(pd.DataFrame([row for rows in found for row in rows]), sure)
 
     if target.mass_kg is not None and not target.told_rest:

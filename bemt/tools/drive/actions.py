@@ -19,9 +19,16 @@ if TYPE_CHECKING:
 __all__ = ["drive", "map", "motor", "thrusters"]
 
 
+_FAN = "A fan is a case: bemt new 70mm --fan --blades 11, then bemt drive fan_70 --kv 2800 --cells 4."
+
+
 @action(
     "Drive", "drive 10x4.5 --kv 900 --cells 3", words=("case",), shown=True,
     common=("motor", "kv", "cells", "mass_kg", "rotors", "capacity_Ah", "reading", "out"),
+    elsewhere=dict.fromkeys(("fan", "duct"), _FAN) | {
+        "blades": "They are in the label, as the 3 of 10x5x3.",
+        "rpm": "The motor sets the speed; at a speed of your own: bemt estimate 10x5 --rpm 6000.",
+    },
 )  # fmt: skip
 def drive(
     case: Propeller | Path = ".", *, motor: str | None = None, kv: float | None = None, cells: Cells | None = None,

@@ -18,10 +18,10 @@ from bemt.base.action import Answered
 from bemt.base.arrays import Array
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError, refuse
 from bemt.base.tables import csv_text, json_text, number_text, write_atomic
-from bemt.base.units import G0, INCH, KGF
+from bemt.base.units import G0, KGF
 from bemt.rotors.case import Case
 from bemt.rotors.case.load import with_changes
-from bemt.rotors.case.motor import named_motor
+from bemt.rotors.case.motor import fast_words, named_motor
 from bemt.rotors.case.propagate import propagate, vary
 from bemt.rotors.case.schema import AIRSPEED
 from bemt.tools.drive import drive_model, mission, outputs
@@ -38,8 +38,6 @@ LOW, HIGH = 0.2, 0.8
 """Shares of full thrust of the step."""
 HOVER_SHARE = 0.5
 """Hover point as a share of full thrust where no mass is given: a thrust-to-weight ratio of 2."""
-TIPS = (126.0, 190.0, 218.0, 310.0)
-"""Tip speed of K_v times the loaded voltage, without load: 68 % of 1088 motors; 95 % and 99 % below. [m/s]"""
 SHEET = ("drive.motor.size", "drive.motor.winding_drop", "drive.motor.idle_share")
 """What a motor sheet tells."""
 OPTIONS = {
@@ -338,21 +336,8 @@ def _unusual(case: Case) -> list[str]:
     """Say when K_v, cells and diameter seldom go together."""
     table = drive_model.drive_table(case)
     loaded = float(drive_model.battery_of(table).voc(table.soc)) * (1.0 - (table.battery.sag or 0.06))
-    per_m = math.pi * table.kv * loaded / 60.0
-    tips = case.diameter_m * per_m
-    if tips <= TIPS[2] or case.ducted:
-        return []
-    speed = f"without load the tip speed would be {tips:.0f} m/s; 95 % of 1088 recorded motors are below {TIPS[2]:.0f}"
-    if tips <= TIPS[3]:
-        return [f"a fast combination, common for racing: the motor gets hot at full throttle\n  ({speed})"]
-    fit = [v / per_m / INCH for v in TIPS[:2]]
-    slower = [v / (math.pi * case.diameter_m * loaded) * 60.0 for v in TIPS[:2]]
-    return [
-        "an unusual combination: a typical motor would overload and burn out; the numbers assume one that is large "
-        f"enough.\n  {speed[0].upper()}{speed[1:]}.\n  {table.kv:g} rev/min/V on {table.cells}S suits propellers of "
-        f"{fit[0]:.1f} to {fit[1]:.1f} in; one of {case.diameter_m / INCH:.3g} in suits {slower[0]:.0f} to "
-        f"{slower[1]:.0f} rev/min/V."
-    ]
+    words = fast_words(table.kv, loaded, f"{table.cells}S", case.diameter_m)
+    return [words] if words and not case.ducted else []
 
 
 def shown(band: DriveBand, unit: str, scale: float = 1.0) -> str:

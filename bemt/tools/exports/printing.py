@@ -104,6 +104,10 @@ class AsPrinted(Documented):
 
     least_thickness_mm: float
     hub_by_ratio_mm: float | None = field(default=None, kw_only=True)  # Hub of which the case states but a ratio
+    bore_mm: float | None = field(default=None, kw_only=True)  # Hole for the shaft; None is a solid hub
+    recess_mm: tuple[float, float] | None = field(default=None, kw_only=True)  # Round one in the back: width and depth
+    hex_mm: tuple[float, float] | None = field(default=None, kw_only=True)  # For a nut: across flats and depth
+    hand: str = field(default="right", kw_only=True)  # right, left or both
 
 
 class Widened(AsPrinted):
@@ -141,10 +145,14 @@ def shapes(case: Case, options: Options | None, request: Print | None) -> list[S
         rotor = replace(rotor, hub_length=1e-3 * request.hub_height_mm)
     made = {"right": ("_right", replace(rotor, rotation=1)), "left": ("_left", replace(rotor, rotation=-1))}
     rotors = [("", rotor)] if request.hand is None else [made[h] for h in made if request.hand in (h, "both")]
-    options, out = Options(printed=_printed(request, duct is not None)), []
+    made_so = _printed(request, duct is not None)
+    options, out = Options(printed=made_so), []
     for end, rotor in rotors:
         guessed = request.hub_diameter_mm is None and case.file.rotor.hub_ratio is not None
-        told = AsPrinted(thickness_mm(request), hub_by_ratio_mm=2e3 * rotor.Rhub if guessed else None)
+        told = AsPrinted(
+            thickness_mm(request), hub_by_ratio_mm=2e3 * rotor.Rhub if guessed else None, **_mount(made_so),
+            hand=request.hand or ("right" if rotor.rotation > 0 else "left"),
+        )  # fmt: skip
         try:
             model = build(rotor, None, options)
         except GeometryError as error:
@@ -200,13 +208,39 @@ def _changes(case: Case, before: Rotor, after: Rotor, told: AsPrinted) -> Widene
         loads.append((float(found.thrust_N[0]), float(found.torque_Nm[0])))
     thrust, torque = (100.0 * (b / a - 1.0) for a, b in zip(*loads, strict=True))
     tip = (1e3 * float(old[-1]), 1e3 * float(new[-1]))
-    return Widened(told.least_thickness_mm, tip, where, thrust, torque, hub_by_ratio_mm=told.hub_by_ratio_mm)
+    return Widened(tip_chord_mm=tip, wider_from_r_over_R=where, thrust_pct=thrust, torque_pct=torque, **vars(told))
+
+
+def _mount(made: Printed) -> dict[str, Any]:
+    """Hole and recess of the hub in mm."""
+    pairs = {"recess_mm": made.recess, "hex_mm": made.hexagon}
+    known = {name: (1e3 * width, 1e3 * depth) for name, (width, depth) in pairs.items() if width > 0.0}
+    return {"bore_mm": 1e3 * made.bore if made.bore > 0.0 else None, **known}
+
+
+def _mount_text(printed: AsPrinted) -> str:
+    """The hole for the shaft, or how to get one."""
+    if printed.bore_mm is None:
+        return f"! the hub is solid, without a hole for the shaft: --bore-mm 5, or --adapter {', '.join(ADAPTERS)}"
+    more = ""
+    for what, pair in (("a recess", printed.recess_mm), ("a hexagon for a nut", printed.hex_mm)):
+        more += "" if pair is None else f"; {what} in the back, {pair[0]:.3g} mm wide and {pair[1]:.3g} mm deep"
+    return f"hole for the shaft: {printed.bore_mm:.3g} mm{more}"
+
+
+HANDS = {
+    "right": "right hand: counterclockwise (CCW) seen from the front, as from above a multirotor; --hand left turns CW",
+    "left": "left hand: clockwise (CW) seen from the front, as from above a multirotor; --hand right turns CCW",
+    "both": "both hands: _right turns counterclockwise (CCW) seen from the front, as from above a multirotor, _left CW",
+}
 
 
 def printed_text(printed: AsPrinted) -> list[str]:
     """Lines for the terminal."""
     lines = [
         f"printed with a least thickness of {printed.least_thickness_mm:g} mm",
+        _mount_text(printed),
+        HANDS[printed.hand],
         "strength and highest speed are not judged: bemt design keeps a blade within the strength of its material",
     ]
     if (hub := printed.hub_by_ratio_mm) is not None:
