@@ -20,6 +20,7 @@ from bemt.judge.diagnose.problem import Part, Problem, SpeedCurve
 from bemt.judge.diagnose.record import CHANNELS, POWER_OPEN, Record, concatenated, dense, merged, owners
 from bemt.physics import coefficients as co
 from bemt.physics.bem import model as bem
+from bemt.physics.bem.solver import below_tables
 from bemt.physics.effects.base import Effect
 from bemt.rotors.case.prepare import k1k2_case, prepare_case
 from bemt.rotors.case.propagate import validity_of
@@ -107,7 +108,11 @@ def _outside(part: Part, case: Case) -> tuple[str, ...]:
     n, D = flow.n, 2.0 * flow.R
     Re = np.asarray(co.Re75(flow.chord, n, D, flow.V, flow.rho, flow.mu))
     J, M_tip = np.asarray(co.J(flow.V, n, D)), np.asarray(co.M_tip(n, D, flow.a_sound))
-    return counted(validity_of(case, J, Re, M_tip)[1])
+    prep = part.model.prep
+    held = np.where(Re < prep.Re_bottom, below_tables(prep), "")
+    return counted(
+        [(*filter(None, [own]), *flags) for own, flags in zip(held, validity_of(case, J, Re, M_tip)[1], strict=True)]
+    )
 
 
 def _one_drive(parts: Sequence[Part]) -> tuple[Part, ...]:

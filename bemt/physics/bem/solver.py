@@ -485,6 +485,11 @@ def _Re75(prep: Prepared, points: Array) -> Array:
     return np.asarray(co.Re75(chord, turns, prep.D, *(points[:, i] for i in (K.P_V, K.P_RHO, K.P_MU))))
 
 
+def below_tables(prep: Prepared) -> str:
+    """Flag of a point whose Reynolds number at 0.75 R the section tables do not reach."""
+    return f"Re at 0.75 R below {prep.Re_bottom:,.0f}: section tables held at their least Reynolds number"
+
+
 def _words(
     prep: Prepared, status: int, where: int, bridged: int, stagnant: int, reversed_: int, fast: int, slow: int,
     behind: int, cavitates: int,
@@ -506,7 +511,7 @@ def _words(
     if fast:
         words.append(f"helical tip Mach above {prep.mach_top:.2f}: section tables held at their last Mach number")
     if slow:
-        words.append(f"Re at 0.75 R below {prep.Re_bottom:,.0f}: section tables held at their least Reynolds number")
+        words.append(below_tables(prep))
     if cavitates:
         words.append(
             f"cavitates at a depth of 1 m: blades of this area take {keller_N(prep.rotor):.3g} N (Keller 1966)"
