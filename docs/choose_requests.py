@@ -40,8 +40,8 @@ def row(words: str, found: DriveChoice) -> str:
     table = found.table
     first = table.iloc[0]
     if first.probability < found.sure:
-        most = table.loc[table.full_thrust_N.idxmax()]
-        return f"| {words} | none is sure; {most.label} gives {most.full_thrust_N:.3g} N |" + " |" * 7
+        nearest = f"none is sure; nearest {first.label}, at {first.probability:.0%}"
+        return f"| {words} | {nearest} | {first.kv:.0f} | | | {first.full_thrust_N:.3g} |" + " |" * 3
     even = table[(table.label == first.label) & (table.probability >= 0.5)].kv.min()
     least = best_of_each(found.good).sort_values("mean_W").iloc[0]
     gain = 1.0 - least.mean_W / first.mean_W
