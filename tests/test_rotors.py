@@ -230,7 +230,7 @@ def test_outside_the_band_grows_with_the_distance_without_a_jump_and_says_why(
 ) -> None:
     factor, words = _factor(**{name: values})
     assert factor[0] == 1.0 and np.all(np.diff(factor) >= 0.0) and np.max(np.diff(factor)) < 0.1
-    assert factor[-1] > 1.5 and word in words[-1] and f"times {factor[-1]:.3g}" in words[-1]
+    assert factor[-1] > 1.5 and word in words[-1] and f" {factor[-1]:.3g} times" in words[-1]
 
 
 @pytest.mark.parametrize(

@@ -99,19 +99,6 @@ class SpeedRatio:
             return f"divided twice by {self.set} pole pairs: multiply by {self.set}"
         return f"counter set to {self.set} instead of {self.true} {self.cause}: multiply by {self.set}/{self.true}"
 
-    @property
-    def short(self) -> str:
-        """The ratio and what makes it.
-
-        >>> [r.short for r in speed_ratios(rarest=0.5) if r.ratio in (7.0, 7.0 / 6.0)]
-        ['x7: revolutions of 7 pole pairs', 'x7/6: 6 pole pairs set instead of 7']
-        """
-        if self.set == 1:
-            return f"x{self.true}: revolutions of {self.true} pole pairs"
-        if self.true == 1:
-            return f"x1/{self.set}: divided twice by {self.set} pole pairs"
-        return f"x{self.true}/{self.set}: {self.set} {self.cause} set instead of {self.true}"
-
 
 # Display of units, where it is not the suffix with blanks.
 _SHOWN = {"rad_s": "rad/s", "rev_s": "rev/s (Hz)", "rpm": "rev/min", "m_s": "m/s", "km_h": "km/h", "ft_s": "ft/s",
@@ -245,8 +232,3 @@ def speed_ratios(rarest: float = math.inf, nearest: Fraction = Fraction(1)) -> t
         found.setdefault(Fraction(r.true, r.set), r)
     far = {f: r for f, r in found.items() if max(f, 1 / f) >= nearest}
     return tuple(r for r in far.values() if r.rarity <= rarest)
-
-
-def speed_ratio(ratio: float) -> SpeedRatio | None:
-    """Miscount that makes a ratio of the indicated over the true speed; None where none does."""
-    return next((r for r in speed_ratios() if math.isclose(r.ratio, ratio, rel_tol=1e-6)), None)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
-from bemt.base.unit_errors import speed_ratio
+from bemt.base.unit_errors import SpeedRatio, speed_ratios
 from bemt.judge.compare.drive_laws import title_of
 from bemt.judge.explanation import Size
 from bemt.physics import effects
@@ -71,8 +72,8 @@ def _of_unit(found: Found, unit: str) -> str:
 
 
 def _of_speed(factor: float) -> str:
-    known = speed_ratio(factor)
-    return "" if factor == 1.0 else f"x{factor:.3g}" if known is None else known.short
+    known = next((r for r in speed_ratios() if math.isclose(r.ratio, factor, rel_tol=1e-6)), None)
+    return "" if factor == 1.0 else f"x{factor:.3g}" if known is None else _miscount(known)
 
 
 def of_largest(name: str, parameter: str, value: float, largest: Mapping[str, float]) -> str:
@@ -93,3 +94,16 @@ def sized(p: Parameter, value: float, form: str = ".3g") -> str:
     if _is_share(p):
         return f"{100.0 * value:{form}} %"
     return f"{value:{form}}" if p.unit in ("1", "") else f"{value:{form}} {p.unit}"
+
+
+def _miscount(r: SpeedRatio) -> str:
+    """The ratio and what makes it.
+
+    >>> [_miscount(r) for r in speed_ratios(rarest=0.5) if r.ratio in (7.0, 7.0 / 6.0)]
+    ['x7: revolutions of 7 pole pairs', 'x7/6: 6 pole pairs set instead of 7']
+    """
+    if r.set == 1:
+        return f"x{r.true}: revolutions of {r.true} pole pairs"
+    if r.true == 1:
+        return f"x1/{r.set}: divided twice by {r.set} pole pairs"
+    return f"x{r.true}/{r.set}: {r.set} {r.cause} set instead of {r.true}"

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
-from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -55,48 +54,26 @@ def concat(series: Iterable[Dataset], name: str | None = None) -> Dataset:
         raise InputError(Fault(name or "concat", "", got, "one or more series of one kind", ""))
     if len(parts) == 1:
         return parts[0] if name is None else replace(parts[0], name=name)
-    values = _by_key(parts, "values", np.nan, np.concatenate)
+    channels = list(dict.fromkeys(key for part in parts for key in part.values))
+
+    def joined(attribute: str, key: str) -> Array:
+        return np.concatenate([getattr(p, attribute).get(key, np.full(len(p), np.nan)) for p in parts])
+
     return Dataset(
         kinds[0],
         parts[0].name if name is None else name,
-        values,
-        _by_key(parts, "u", np.nan, np.concatenate),
-        _chained(part.flags for part in parts),
+        {key: joined("values", key) for key in channels},
+        {key: joined("u", key) for key in channels},
+        sum((part.flags for part in parts), ()),
         {"parts": tuple((part.name, len(part), dict(part.provenance)) for part in parts)},
-        _chained(part.labels or ("",) * len(part) for part in parts) if any(part.labels for part in parts) else (),
-        notes=tuple(dict.fromkeys(_chained(part.notes for part in parts))),
-        units=_units(parts, values),
-        lines=_chained(part.lines for part in parts) if all(part.lines for part in parts) else (),
-        texts=_by_key(parts, "texts", "", _chained),
-    )
-
-
-def _chained(columns: Iterable[Iterable[Any]]) -> tuple[Any, ...]:
-    """Columns of all parts, one after another."""
-    return tuple(chain.from_iterable(columns))
-
-
-def _by_key(parts: Sequence[Dataset], table: str, absent: Any, join: Callable[[Any], Any]) -> dict[str, Any]:
-    """Columns of a table that all parts have, joined by key; `absent` in every row of a part that lacks one."""
-    tables = [getattr(part, table) for part in parts]
-    return {key: join([own.get(key, (absent,) * len(part)) for own, part in zip(tables, parts, strict=True)])
-            for key in dict.fromkeys(_chained(tables))}  # fmt: skip
-
-
-def _units(parts: Sequence[Dataset], channels: Iterable[str]) -> dict[str, str]:
-    """Units that the parts state; "" where two differ."""
-    stated = {key: unit for part in parts for key, unit in part.units.items()}
-    return stated | {key: "" for key in channels if len({part.unit(key) for part in parts if key in part}) > 1}
-
-
-def _in_si(column: str) -> tuple[str, float, float]:
-    """Channel of a column by the unit at its end, with scale and offset to SI; as it is where it has them."""
-    base, unit = units.split_suffix(column)
-    if column == "rpm" or column in DIMENSIONLESS or unit is None or (unit.factor, unit.offset) == (1.0, 0.0):
-        return column, 1.0, 0.0
-    si_unit = (unit.dimension, 1.0, 0.0)
-    si = next(s for s, o in units.UNITS.items() if (o.dimension, o.factor, o.offset) == si_unit)
-    return f"{base}_{si}", unit.factor, unit.offset
+        sum((part.labels or ("",) * len(part) for part in parts), ()) if any(part.labels for part in parts) else (),
+        notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
+        units={key: unit for part in parts for key, unit in part.units.items()}
+        | {key: "" for key in channels if len({part.unit(key) for part in parts if key in part}) > 1},
+        lines=sum((tuple(part.lines) for part in parts), ()) if all(part.lines for part in parts) else (),
+        texts={key: sum((part.texts.get(key, ("",) * len(part)) for part in parts), ())
+               for key in dict.fromkeys(key for part in parts for key in part.texts)},
+    )  # fmt: skip
 
 
 def from_pandas(frame: pd.DataFrame, kind: str = "bench", name: str = "table", **more: Any) -> Dataset:
@@ -142,12 +119,17 @@ def from_pandas(frame: pd.DataFrame, kind: str = "bench", name: str = "table", *
             continue
         prefix = next((f"{o}_" for o in ORIGINS if heading.startswith(f"u_{o}_")), "")
         column = heading.removeprefix("u_").removeprefix(prefix)
-        channel, scale, offset = _in_si(column)
-        fault = channel_fault(column) if channel == column else None
-        if fault and all(isinstance(cell, str) for cell in frame[heading]):
+        base, unit = units.split_suffix(column)
+        scale, offset, channel = 1.0, 0.0, column
+        named = column == "rpm" or column in DIMENSIONLESS
+        if not named and unit is not None and (unit.factor, unit.offset) != (1.0, 0.0):
+            base_unit = (unit.dimension, 1.0, 0.0)
+            si = next(s for s, o in units.UNITS.items() if (o.dimension, o.factor, o.offset) == base_unit)
+            scale, offset, channel = unit.factor, unit.offset, f"{base}_{si}"
+        elif (fault := channel_fault(column)) and all(isinstance(cell, str) for cell in frame[heading]):
             texts[heading] = tuple(frame[heading])
             continue
-        if fault:
+        elif fault:
             faults.append(Fault(name, heading, *fault))
             continue
         try:

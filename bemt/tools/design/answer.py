@@ -12,7 +12,8 @@ from bemt.base.action import Answered
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
 from bemt.base.tables import csv_text, json_text, number_of, number_text, text_table, write_atomic
 from bemt.base.units import INCH
-from bemt.rotors.case.motor import LIST, fast_words, motors_on_sale
+from bemt.rotors.case.motor import LIST, motors_on_sale
+from bemt.rotors.case.tip_speed import fast_words
 from bemt.tools.design.search import SOC_END, Target
 
 if TYPE_CHECKING:

@@ -36,7 +36,8 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.units import G0, INCH
 from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V
-from bemt.rotors.case.motor import SCATTER, SCATTER_MASS, class_resistance, fastest_kv
+from bemt.rotors.case.motor import SCATTER, SCATTER_MASS, class_resistance
+from bemt.rotors.case.tip_speed import fastest_kv
 from bemt.rotors.case.unknowns import DRIVE, ESC_DROP
 from bemt.tools.design import motors_file, rotor_loads
 from bemt.tools.design.motors_file import KnownMotor

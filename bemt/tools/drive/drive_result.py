@@ -21,9 +21,10 @@ from bemt.base.tables import csv_text, json_text, number_text, write_atomic
 from bemt.base.units import G0, KGF
 from bemt.rotors.case import Case
 from bemt.rotors.case.load import with_changes
-from bemt.rotors.case.motor import fast_words, named_motor
+from bemt.rotors.case.motor import named_motor
 from bemt.rotors.case.propagate import propagate, vary
 from bemt.rotors.case.schema import AIRSPEED
+from bemt.rotors.case.tip_speed import fast_words
 from bemt.tools.drive import drive_model, mission, outputs
 from bemt.tools.drive.drive_model import EFFECTS, Drive, RotorMap, Steady
 
