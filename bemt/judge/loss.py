@@ -66,7 +66,7 @@ class Decision:
         return replace(self, why=other.why) if same else self
 
 
-class Judged(Answered):
+class VerdictAnswer(Answered):
     """Answer with a verdict."""
 
     @property

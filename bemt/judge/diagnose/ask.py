@@ -28,7 +28,7 @@ from bemt.judge.diagnose.document import document, text
 from bemt.judge.diagnose.load import cases_of, load_all
 from bemt.judge.diagnose.record import Record
 from bemt.judge.diagnose.suggest import Given
-from bemt.judge.loss import CLAIMS, Judged
+from bemt.judge.loss import CLAIMS, VerdictAnswer
 from bemt.rotors.case import Case, case_of
 from bemt.rotors.case.words import sorted_out
 from bemt.rotors.propeller import Propeller, rotor_of
@@ -42,7 +42,7 @@ REPEATABILITY_MAX = 20.0
 
 
 @dataclass(frozen=True, eq=False)
-class Answer(Judged):
+class Answer(VerdictAnswer):
     """Result of a diagnosis, returned by :func:`diagnose`.
 
     Parameters
@@ -131,7 +131,7 @@ class Answer(Judged):
             raise InputError(system_fault(error)) from error
 
 
-class OnePoint(Judged, Told):
+class OnePoint(VerdictAnswer, Told):
     """One point, which cannot be diagnosed, beside the model."""
 
 

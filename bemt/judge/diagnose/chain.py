@@ -153,18 +153,15 @@ def _decided(P: Mapping[Explanation, float], plain: Mapping[Explanation, float])
 def _with_drive(rotor: Diagnosis, motor: Diagnosis) -> Diagnosis:
     """Answer on loads and drive, measured apart: loads at the measured speed, the speed at the pulse width."""
     P, Q = loss.parts(rotor.found.probability, motor.found.probability)
-    rotor, motor = (
-        replace(d, found=replace(d.found, probability=p)) for d, p in ((rotor, P), (motor, Q))
-    )  # each beside the other
-    loads, drive = loss.decide(P).reasoned_as(rotor.said), _decided(_of_motor(motor.found), Q)
+    beside = replace(motor.found, probability=Q)
+    loads, drive = loss.decide(P).reasoned_as(rotor.said), _decided(_of_motor(beside), Q)
     said = loss.joined(loads, drive, P.get(NONE, 0.0))
-    if said.by == "drive":
-        return replace(motor, said=said, drive=motor, loads=rotor, absent=rotor.absent)
+    if said.by == "drive":  # each part keeps the posterior that is its own
+        return replace(motor, found=beside, said=said, drive=motor, loads=rotor, absent=rotor.absent)
+    whole = replace(rotor, found=replace(rotor.found, probability=P), said=said, drive=motor)
     if said.by == "both":
-        return replace(
-            rotor, decision=said, said=said, parameters={**rotor.parameters, **motor.parameters}, drive=motor
-        )
-    return replace(rotor, said=said, drive=motor)
+        return replace(whole, decision=said, parameters={**rotor.parameters, **motor.parameters})
+    return whole
 
 
 def _scores(found: posterior.Evidence, after: Array, held: Array, gp_only: Array) -> dict[str, dict[str, float]]:

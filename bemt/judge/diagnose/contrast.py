@@ -34,7 +34,7 @@ from bemt.judge.diagnose.by_laws import changed
 from bemt.judge.diagnose.load import at_once, is_table, load, load_all
 from bemt.judge.diagnose.record import from_series
 from bemt.judge.diagnose.suggest import Given
-from bemt.judge.loss import Judged
+from bemt.judge.loss import VerdictAnswer
 from bemt.physics.dataset import Dataset, from_pandas
 from bemt.rotors.propeller import Propeller, rotor_of
 from geometry.common import GeometryError
@@ -57,7 +57,7 @@ _SPAN, _POWERS, _ALIKE = 0.2, (1.5, 3.5), 0.95
 
 
 @dataclass(frozen=True, eq=False)
-class Contrast(Judged):
+class Contrast(VerdictAnswer):
     """What changed between two recordings.
 
     Attributes
