@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -33,6 +34,8 @@ MOST = 40
 """Points of a recording that are weighed; more are averaged with alike ones [1]."""
 # Log odds below which nothing is counted.
 _SHUT = -60.0
+# What a cell reads at least, share of what it was: a logarithm needs something.
+_LEAST_READ = 1e-3
 # Speed below this share of the largest: a rotor that has just set off.
 _STARTED = 0.15
 _COVARIATES = ("time_s", "temperature_K", "tip_gap_m", "wall_distance_m", "second_rotor_rad_s", "run")
@@ -131,19 +134,19 @@ def as_driven(candidate: Candidate, pair: RunChange, problem: Problem) -> Candid
     """Candidate with the odds of the drive, which knows neither what a speed is read as nor what a cell reads."""
     if effects.catalogue()[candidate.id].kind != "stand":
         return candidate
-    if candidate.id in ("rpm_scale", "unit_slip"):
-        read = [abs(s["factor"]) * (1.0 + s.get("eps", 0.0)) if s.get("channel", "rpm") == "rpm" else 1.0
-                for s in candidate.settings]  # fmt: skip
-        told = [pair.told_by_drive(math.log(x)) for x in read]
-    elif "torque" in {r.kind for r in pair.ratios.values()} and not pair.by_proxy:
-        here = (problem.channel == CHANNELS.index("torque_Nm")) & problem.free & (np.abs(problem.f0) > 0.0)
-        if not here.any():
-            return candidate
-        share = np.median(candidate.signatures[here] / problem.f0[here, None], axis=0)
-        told = [pair.told_by_drive(misread=math.log1p(max(x, -0.95))) if x else 0.0 for x in share.tolist()]
-    else:
-        return candidate
-    return replace(candidate, weight=candidate.weight * np.exp(np.maximum(told, _SHUT)))
+    cell = "torque" in {r.kind for r in pair.ratios.values()} and not pair.by_proxy
+    here = (problem.channel == CHANNELS.index("torque_Nm")) & problem.free & (np.abs(problem.f0) > 0.0)
+    read = np.ones(len(candidate.settings))  # what the cell reads over what it was [1]
+    if cell and here.any():
+        read += np.median(candidate.signatures[here] / problem.f0[here, None], axis=0)
+
+    def told(setting: Mapping[str, Any], torque: float) -> float:
+        if candidate.id == "rpm_scale" or setting.get("channel") == "rpm":
+            return pair.told_by_drive(math.log(abs(setting["factor"]) * (1.0 + setting.get("eps", 0.0))))
+        return pair.told_by_drive(misread=math.log(max(abs(torque), _LEAST_READ))) if torque != 1.0 else 0.0
+
+    odds = [told(s, x) for s, x in zip(candidate.settings, read.tolist(), strict=True)]
+    return replace(candidate, weight=candidate.weight * np.exp(np.maximum(odds, _SHUT)))
 
 
 def records_of(pair: RunChange) -> tuple[Record, Record] | None:

@@ -25,6 +25,7 @@ from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation, KindPrior
 from bemt.physics import effects
 from bemt.physics.dataset import Dataset
 from bemt.physics.effects.air_density import AirDensity
+from bemt.physics.effects.base import FORM
 from bemt.physics.effects.duct import DuctEffect
 
 if TYPE_CHECKING:
@@ -172,24 +173,44 @@ def combined(found: Evidence, change: RunChange | None = None) -> dict[Explanati
     odds = {k: p * (EXACT if k.ids & broken else 1.0) for k, p in found.probability.items()}
     P = {k: p / sum(odds.values()) for k, p in odds.items()}
     if change is not None and change.loads.ranked:
-        P = both(P, change.loads.ranked)
+        P = both(P, change.loads.ranked, _law_share(found))
     return _doubted(found.problem, P)
 
 
-def both(P: Mapping[Explanation, float], laws: Mapping[Explanation, float]) -> dict[Explanation, float]:
-    """Posterior over two banks of signatures: causes that laws know share what is unknown to the solver.
+def _law_share(found: Evidence) -> float:
+    """Probability that laws, and not the solver, change as this rotor does: by what each is off, e^2/(e^2 + f^2). [1]
 
-    >>> one, two = Explanation.of("duct"), Explanation.of("section")
+    The solver is off by what it lacks of the reference, laws by their form.
+    """
+    solver, law = found.solver_error**2, sum(w * f**2 for f, w in FORM.items())
+    return solver / (solver + law)
+
+
+def both(
+    P: Mapping[Explanation, float], laws: Mapping[Explanation, float], share: float = 0.0
+) -> dict[Explanation, float]:  # fmt: skip
+    """Posterior over two banks of signatures, of which ``share`` [1] is the probability that the laws are the better.
+
+    Causes that laws know share what is unknown to the solver as well. Of causes that they do not know the solver tells.
+
+    >>> one, two, own = map(Explanation.of, ("duct", "section", "hub_loss"))
     >>> found = both({one: 0.1, UNKNOWN: 0.9}, {one: 0.8, two: 0.1, UNKNOWN: 0.1})
     >>> [round(found[k], 2) for k in (one, two, UNKNOWN)]
     [0.82, 0.09, 0.09]
+    >>> found = both({one: 0.5, own: 0.5}, {one: 0.2, two: 0.8}, 0.5)
+    >>> [round(found[k], 2) for k in (one, two, own)]
+    [0.3, 0.2, 0.5]
     """
-    open_, out = P.get(UNKNOWN, 0.0), dict(P)
+    known = frozenset[str]().union(*(k.ids for k in laws))
+    beyond = {k: p for k, p in P.items() if not k.ids <= known}
+    by_laws = beyond | {k: (1.0 - sum(beyond.values())) * p for k, p in laws.items()}
+    open_, by_solver = P.get(UNKNOWN, 0.0), {UNKNOWN: 0.0, **P}
     for k, p in laws.items():
         if k.ids:
-            out[k] = out.get(k, 0.0) + open_ * p
-            out[UNKNOWN] -= open_ * p
-    return out
+            by_solver[k] = by_solver.get(k, 0.0) + open_ * p
+            by_solver[UNKNOWN] -= open_ * p
+    every = by_solver | by_laws
+    return {k: (1.0 - share) * by_solver.get(k, 0.0) + share * by_laws.get(k, 0.0) for k in every}
 
 
 def reason(problem: Problem, said: Decision) -> Decision:

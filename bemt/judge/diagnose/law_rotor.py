@@ -26,6 +26,8 @@ from bemt.physics.effects.base import Effect, Flow, Loads
 _NO_THRUST, _AT_REST, _ENDS = 0.65, (-2.4, 3.9), (-1.8, -0.05)
 # How far a coefficient may bend over J and over ln n, share of its largest value.
 _OVER_J, _OVER_SPEED = (3.0, 3.0, 2.0), (0.15, 0.1)
+# Zero of a cell of the reference, share of full scale (declared).
+_ZERO = 0.01
 # Scatter of single rows for the fit of a curve, share of the row and of full scale.
 _ROW, _FLOOR = 0.01, 0.003
 # Bends of a recording that are followed: lengths over J and ln n, size over scatter, fewest points.
@@ -102,7 +104,7 @@ class CoefficientCurve:
             mean[1:3], sd[1:3] = np.array(at_rest[:2]) * level, 1e-6 * top
         else:
             sd[1 : 1 + powers] = np.array(_OVER_J[:powers]) * top
-        sd[1 + powers :] = np.array(_OVER_SPEED) * top * min(1.0, half / 0.1)
+        sd[1 + powers :] = np.array((*_OVER_SPEED, _ZERO)) * top * min(1.0, half / 0.1)
         noise = np.hypot(_ROW * c, _FLOOR * top)
         W = A * sd / noise[:, None]
         found = np.linalg.lstsq(
@@ -125,7 +127,9 @@ class CoefficientCurve:
 
     def _columns(self, J: Array, x: Array) -> Array:
         at = np.clip((x - self.speed[0]) / self.speed[1], -1.0, 1.0) * min(1.0, self.speed[1] / 0.1)
-        return np.column_stack([np.ones_like(J), *(J ** (k + 1) for k in range(self.powers)), at, at**2])
+        # full scale is at the highest speed
+        zero = np.exp(-2.0 * (np.maximum(x, self.speed[0] - self.speed[1]) - self.speed[0] - self.speed[1]))
+        return np.column_stack([np.ones_like(J), *(J ** (k + 1) for k in range(self.powers)), at, at**2, zero - 1.0])
 
     def __call__(self, J: Array, rpm: Array) -> Array:
         """Coefficient at points."""

@@ -80,6 +80,12 @@ class Evidence:
         return max(float(chdtrc(s.r.size, s.r @ s.r)) for s in self.states)
 
     @property
+    def solver_error(self) -> float:
+        """Root mean square of the error of the solver itself, over settings of the covariance [1]."""
+        p = shares([max(s.log_z.values()) + np.log(s.hyper.weight) for s in self.states])
+        return float(np.sqrt(p @ [s.hyper.model**2 for s in self.states]))
+
+    @property
     def inclusion(self) -> dict[str, float]:
         """Probability that an effect is at work, alone or in a pair, by id, likeliest first [1]."""
         out = dict.fromkeys(self.spans, 0.0)
