@@ -660,3 +660,15 @@ def test_a_rotor_in_water_is_judged_by_the_diameter_and_the_fluid_of_its_case(
         assert "Suggestion" not in capsys.readouterr().out
     assert main(["diagnose", str(tmp_path / "tank.csv"), "--case", case, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["findings"] == []
+
+
+def test_loads_of_two_rows_that_were_exchanged_are_left_out_and_their_lines_named() -> None:
+    """Both stand out of the curve of all others, which is judged by its median."""
+    values = {k: v for k, v in stand(rows=9).items() if k != "time_s"}
+    for channel in ("thrust_N", "torque_Nm"):
+        values[channel][[3, 6]] = values[channel][[6, 3]]
+    found = said(check(recording(values)), "misread")
+    assert {(f.channel, f.rows) for f in found} == {(c, (k,)) for c in ("thrust_N", "torque_Nm") for k in (3, 6)}
+    assert all("loads of lines 5 and 8 exchanged" in f.correction for f in found)
+    values["thrust_N"][1] *= 3.0  # a third is no exchange, and too many of nine to say who is right
+    assert not said(check(recording(values)), "misread", "thrust_N")

@@ -10,7 +10,7 @@ from bemt.base import unit_errors
 from bemt.base.arrays import Array
 from bemt.base.tables import number_of
 from bemt.base.units import ZERO_CELSIUS
-from bemt.data.readers.samples import STICKS, lone, stuck
+from bemt.data.readers.samples import LONE_SD, STICKS, lone, stuck
 from bemt.data.recordings.findings import (
     Facts,
     Finding,
@@ -140,11 +140,14 @@ def misread(facts: Facts) -> Iterator[Finding]:
             rows = np.flatnonzero(good & np.isfinite(flow) & np.isfinite(v))
             sense = float(np.sign(np.sum(v[rows])))  # of no row: 0
             times = lone(rpm[rows], v[rows] * sense, flow[rows])
-        for i, off in zip(rows[times != 1.0].tolist(), times[times != 1.0].tolist(), strict=True):
+        odd, why = times != 1.0, "mistyped, or a loose contact? Measure it again"
+        if np.count_nonzero(odd) == 2 and abs(float(np.log(times[odd]).sum())) < 2.0 * LONE_SD:
+            why = f"were the loads of lines {' and '.join(str(facts.lines[i]) for i in rows[odd])} exchanged? Look"
+        for i, off in zip(rows[odd].tolist(), times[odd].tolist(), strict=True):
             at = f"{rpm[i]:.0f} rev/min"
             at += "" if flow is None else f" and J {flow[i]:.2g}" if V is None else f" and {V[i]:.3g} m/s"
             text = f"{v[i]:.4g} in line {facts.lines[i]} is {off:.3g} times what the others give at {at}"
-            fix = "mistyped, or a loose contact? Measure it again; `diagnose` and `compare` leave it out"
+            fix = f"{why}; `diagnose` and `compare` leave it out"
             yield Finding("misread", facts.named(name), text, fix, (i,), "warning")
 
 
