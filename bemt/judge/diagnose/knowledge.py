@@ -1,9 +1,8 @@
 """What is known beside the readings: how likely each explanation is before, and factors of the posterior.
 
 The factors are laws of ratios, exact relations, files that are not right. The signatures of the solver and those of
-scaling laws are two banks for the same hypotheses. Where no signature of the solver fits, its law of the cause may be
-off for this blade; how loads changed from a reference at equal speed is measured and needs no blade, so there the laws
-tell what is unknown to the solver.
+scaling laws are two banks for the same hypotheses. How loads changed from a reference at equal speed is measured and
+needs no blade: the laws tell what is unknown to the solver, and have their share where it misses the reference itself.
 """
 
 from __future__ import annotations
