@@ -202,7 +202,9 @@ def both(
     """
     known = frozenset[str]().union(*(k.ids for k in laws))
     beyond = {k: p for k, p in P.items() if not k.ids <= known}
-    by_laws = beyond | {k: (1.0 - sum(beyond.values())) * p for k, p in laws.items()}
+    heard = 1.0 - laws.get(DOUBT, 0.0)  # two recordings that are no pair tell nothing
+    share *= heard
+    by_laws = beyond | {k: (1.0 - sum(beyond.values())) * p / heard for k, p in laws.items() if not k.doubt}
     open_, by_solver = P.get(UNKNOWN, 0.0), {UNKNOWN: 0.0, **P}
     for k, p in laws.items():
         if k.ids:
