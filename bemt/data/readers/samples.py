@@ -83,9 +83,9 @@ MISREAD = 2.5
 """Times that a speed may differ from what the load of its row needs, before it counts as misread. [1]"""
 LONE, LONE_SDS, LONE_SD = 1.5, 8.0, 0.03
 """Factor, and robust standard deviations of at least so much, by which a single reading is off the others. [1]"""
-BREAKDOWN = 0.25
-"""Share of readings off the others from which it is not said who is right: the median of all slopes holds up to 29 %
-(Rousseeuw and Leroy 1987, ch. 2; not checked). [1]"""
+FEW, BREAKDOWN = 0.1, 0.25
+"""Share of readings off the others from which it is not said who is right, neighbours and single ones: the median of
+all slopes holds up to 29 % (Rousseeuw and Leroy 1987, ch. 2; not checked). [1]"""
 FEWEST_OF_CURVE, MOST_OF_CURVE, SAME_SPEED = 5, 400, 0.02
 """Readings that make a curve, those of no table of points, and the share by which equal speeds differ. [1]"""
 FEWEST_IN_FLOW, SMALL_OFF = 10, 0.2
@@ -207,7 +207,9 @@ def lone(speed: Array, load: Array, flow: Array | None = None) -> Array:
     off = off - np.nanmedian(off)
     sd = max(1.4826 * float(np.nanmedian(np.abs(off))), LONE_SD)
     odd = judged & (np.abs(off) > max(float(np.log(LONE)), LONE_SDS * sd))
-    if np.count_nonzero(odd) > max(1, int(BREAKDOWN * speed.size)):
+    in_turn = odd[np.argsort(speed, kind="stable")]
+    bend = flow is not None or bool(np.any(in_turn[1:] & in_turn[:-1]))  # neighbours that are off are no single ones
+    if np.count_nonzero(odd) > max(1, int((FEW if bend else BREAKDOWN) * speed.size)):
         return times
     others = ~np.eye(speed.size, dtype=bool)
     for between, same in ((dx, SAME_SPEED), *(() if flow is None else ((flow[:, None] - flow, SAME_SPEED),))):
