@@ -29,7 +29,7 @@ from bemt.judge.compare.matched import StandRun, stand_run
 from bemt.judge.compare.recordings import RunChange
 from bemt.judge.compare.smooth_change import Ratio
 from bemt.judge.diagnose.by_laws import changed
-from bemt.judge.diagnose.contrast import compare
+from bemt.judge.diagnose.contrast import Contrast, compare
 from bemt.judge.diagnose.law_rotor import CoefficientCurve
 from bemt.physics.dataset import Dataset
 from bemt.physics.effects import catalogue
@@ -567,7 +567,50 @@ def test_the_printed_command_runs_with_the_rotor_that_was_chosen(
     assert words[1:6] == ["compare", *files, "--rows-b", "rotor=right"]
     assert main([*words[1:6], "--rows-b", "speed_ratio=0.95:1.05"]) == 0
     again = next(line for line in capsys.readouterr().out.splitlines() if "bemt" in line)
-    assert {"rotor=right", "speed_ratio=0.95:1.05", "CASE"} <= set(shlex.split(again))
+    words = shlex.split(again)
+    assert {"rotor=right", "speed_ratio=0.95:1.05", "--ruled-out"} <= {*words}
+    assert main([*words[1:], "--json"]) == 0
+    assert words[-1] not in json.loads(capsys.readouterr().out)["effects"]
+
+
+def test_what_the_user_knows_is_weighed_without_a_case_as_well(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As in `diagnose`: a check ruled one cause out, and another one was changed on purpose."""
+    a, b = pair(tmp_path, scaled(thrust_N=0.85, torque_Nm=1.05), seed=3)
+
+    def probability(answer: Contrast, name: str) -> float:
+        return sum(r["probability"] for r in answer.document["ranking"] if name in r["effect"].split("+"))
+
+    plain = compare(a, b)
+    gone, cause = compare(a, b, ruled_out=[plain.effects[0]]), "propeller"
+    assert plain.effects[0] not in gone.effects and not probability(gone, plain.effects[0])
+    told = compare(a, b, changed=[cause])
+    assert told.effects[0] == cause and probability(told, cause) > 5.0 * probability(plain, cause)
+    step = told.document["next_measurement"]
+    typed = shlex.split(step["command"])
+    assert step["checks"] == cause and typed[-2:] == ["--ruled-out", cause] and "--changed" not in typed
+    assert main([*typed[1:], "--json"]) == 0
+    assert cause not in json.loads(capsys.readouterr().out)["effects"]
+    both = compare(a, b, str(CASES / "prop_10x5"), changed=[cause], ruled_out=["thrust_gain"])
+    assert "thrust_gain" not in both.effects and both.document["diagnosis"]["verdict"] == both.verdict
+    for given, words in (
+        ({"changed": ["propeler"]}, "Did you mean propeller"), ({"changed": ["stall_delay"]}, "--case CASE --changed"),
+        ({"ruled_out": [cause], "changed": [cause]}, "is changed as well"),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=words):
+            compare(a, b, **given)
+
+
+def test_a_drive_that_is_ruled_out_is_no_cause(tmp_path: Path) -> None:
+    """Motor and battery are no effects on the rotor, and are ruled out by their names as well."""
+    a, b = (stand(k) | {"throttle": np.linspace(0.3, 1.0, 17)} for k in (1, 1001))
+    b["rpm"], b["thrust_N"], b["torque_Nm"] = 0.9 * b["rpm"], 0.81 * b["thrust_N"], 0.81 * b["torque_Nm"]
+    files = written(tmp_path / "a.csv", a), written(tmp_path / "b.csv", b)
+    assert "battery_sag" in compare(*files).effects
+    left = compare(*files, ruled_out=["battery_sag"]).effects
+    assert "motor" in left and "battery_sag" not in left
+    assert compare(*files, changed=["motor"]).effects[0] == "motor"
 
 
 def test_turned_blades_of_the_quick_start_are_among_the_causes(

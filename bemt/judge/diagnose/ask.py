@@ -160,8 +160,9 @@ def diagnosed(
     speeds = flow["rpm"]
     stated = as_stated(files, {**run, **({"rpm": speeds[0]} if len(speeds) == 1 and any(run.values()) else {})})
     known_of = known if run["zones"] else as_stated(known, run)
-    cases, records = load_all(stated, given, known_of, off, only, before=lambda found: folder.check(target, found),
-                              ruled_out=[*ruled_out, *changed], reference_case=theirs, **flow)  # fmt: skip
+    said = {"--only": only, "--ruled-out": ruled_out, "--changed": changed}
+    cases, records = load_all(stated, given, known_of, off, said, before=lambda found: folder.check(target, found),
+                              reference_case=theirs, **flow)  # fmt: skip
     repeats = np.nan if repeatability_pct is None else repeatability_pct / 100.0
     records = [replace(r, repeatability=repeats, top_rpm=np.inf if top_rpm is None else top_rpm) for r in records]
     chosen = cases * len(stated) if len(cases) == 1 else cases
