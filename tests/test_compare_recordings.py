@@ -964,3 +964,6 @@ def test_the_same_thrust_per_watt_at_another_voltage_is_said_first(tmp_path: Pat
         assert first.startswith("Same thrust per watt (") and first.endswith(said)
     else:
         assert first.startswith("No change beyond") and "voltage" not in first
+    step = answer.document["next_measurement"]
+    assert ("repeat B with the battery" in step["text"]) is bool(words)
+    assert not words or step["command"] == f"bemt compare {files[0]} B_AGAIN.csv"

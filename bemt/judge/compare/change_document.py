@@ -37,8 +37,7 @@ SCHEMA = "bemt.comparison/1"
 _FIRST = 5.0
 # Change of a load that days of one site can make, and from which on it is worth a thermometer, in ln.
 _DAY, _SEEN = 0.12, 0.03
-# Start of a verdict that rests on what both recordings state.
-_TOLD = (*recordings.AS_RECORDED, "voltage as recorded")
+_ONE_BATTERY = "to compare at one voltage, repeat B with the battery or supply of A"
 # Scatter of readings at one speed, share, that no stand has: something else changes from reading to reading.
 _RESTLESS = 0.10
 _REPEAT = "repeat the run of A and compare it with A: so much two runs differ by without a cause"
@@ -50,9 +49,11 @@ def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
     said, checks = change.leading, ""
     if change.other_setup and said.verdict in ("none", "insufficient"):
         text, command = ONE_SETUP, ""
+    elif said.why.startswith(recordings.VOLTS_AS_RECORDED) or said.why.endswith(recordings.ONLY_VOLTS):
+        text, command = _ONE_BATTERY, asked.command(b="B_AGAIN.csv")
     elif said.verdict == "none":
         text, command = _to_see_more(change, asked)
-    elif said.why.startswith(_TOLD):
+    elif said.why.startswith(recordings.AS_RECORDED):
         text, command = "", ""
     elif said.verdict in ("named", "sensor"):
         checks = next(filter(check_of, said.effects), "")

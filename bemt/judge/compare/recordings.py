@@ -28,6 +28,8 @@ REVERSED = "thrust has the other sign in B, and its size is the same"
 """Verdict of a reversed cell, or of a rotor that is mounted or turns the other way round."""
 AS_RECORDED = ("density as recorded", "by the thermometers")
 """Starts of the reason of a density that both files state."""
+VOLTS_AS_RECORDED = "voltage as recorded"
+"""Start of the reason of a voltage that both files state."""
 ERROR_IN = ("error in ", "warning in ")
 """Start of a note on what cannot be so in A or B."""
 # Recorded densities are this good: a barometer, a thermometer and nobody's humidity, share.
@@ -134,7 +136,7 @@ class RunChange:
         said = drive_laws.judge_drive({k | drive_laws.SUPPLY: p * (1.0 if k == NONE else SECOND) for k, p in P.items()})
         if said.effects != tuple(drive_laws.SUPPLY):
             return said
-        why = f"voltage as recorded, {ratio - 1.0:+.1%} at equal command; the speed goes with it"
+        why = f"{VOLTS_AS_RECORDED}, {ratio - 1.0:+.1%} at equal command; the speed goes with it"
         return replace(said, parameters={"battery_sag": {"ratio": Size(ratio, ratio, ratio, "1")}}, why=why)
 
     @property
