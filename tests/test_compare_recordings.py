@@ -13,11 +13,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+import bemt
 from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.data.recordings.load import import_file
@@ -600,6 +602,31 @@ def test_what_the_user_knows_is_weighed_without_a_case_as_well(
     ):  # fmt: skip
         with pytest.raises(InputError, match=words):
             compare(a, b, **given)
+
+
+def test_a_stated_speed_is_that_of_the_file_without_one_or_refused(tmp_path: Path) -> None:
+    """Files of a tunnel state J, and their speed in the name."""
+    J = np.linspace(0.0, 0.6, 9)
+    tables = {"a.csv": {"J": J, "thrust_N": 3.0 - 4.0 * J}, "b.csv": {"J": J, "thrust_N": 3.3 - 4.4 * J}}
+    a, b = (written(tmp_path / name, table) for name, table in tables.items())
+    own = written(tmp_path / "c.csv", {**tables["b.csv"], "rpm": np.full(9, 6000.0)})
+    stated = compare(a, b, label="10x5", run={"rpm": 6000.0})
+    assert [*stated.document["ratios"]] == ["thrust_N"]
+    assert stated.document["ratios"]["thrust_N"]["ratio"] == pytest.approx(1.1, rel=1e-3)
+    one, two = (compare(a, c, label="10x5", run={"rpm": 6000.0}).document["ratios"] for c in (b, own))
+    assert one["thrust_N"]["ratio"] == pytest.approx(two["thrust_N"]["ratio"])
+    frame = pd.DataFrame(tables["b.csv"])
+    assert bemt.compare(a, frame, label="10x5", rpm=6000.0).document["ratios"].keys() == one.keys()
+    twice = written(tmp_path / "d.csv", {**tables["a.csv"], "rpm": np.full(9, 6000.0)})
+    with pytest.raises(InputError, match="two files with a speed of their own"):
+        compare(own, twice, run={"rpm": 6000.0})
+
+
+def test_options_of_a_pair_are_refused_beside_one_file(tmp_path: Path) -> None:
+    a = written(tmp_path / "a.csv", stand(1))
+    for given in ({"changed": ["propeller"]}, {"ruled_out": ["duct"]}, {"rows_a": ["rpm=4000:6000"]}, {"air_a": "20C"}):
+        with pytest.raises(InputError, match=f"{next(iter(given))}: got one file"):
+            bemt.compare(a, case="10x5", **given)
 
 
 def test_a_drive_that_is_ruled_out_is_no_cause(tmp_path: Path) -> None:

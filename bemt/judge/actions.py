@@ -167,7 +167,7 @@ def compare(
     changed : sequence of str
         Effects that you changed, such as propeller ("these are two propellers"): said, weighed, checked.
     rpm : float, optional
-        Speed of exports of CFD, or of one file beside the case, where no file states it. [rev/min]
+        Speed of files without one, tables or exports of CFD. [rev/min]
     unit : mapping
         Unit of a quantity or heading of both tables, or of one CFD run, that states none: thrust=N.
     column : mapping

@@ -25,6 +25,7 @@ from bemt.data.recordings.channels import named
 from bemt.data.recordings.check import OPEN_OR_OUT, check, left_out
 from bemt.data.recordings.load import as_stated, import_file, is_measured, one_as_stated, stated_options
 from bemt.data.recordings.shown import between_setups, options_of
+from bemt.data.recordings.stated import IGNORED, filled
 from bemt.judge.compare import drive_laws, one_run, two_runs
 from bemt.judge.compare.change_document import DIAGNOSED, ComparedRuns, RankedCause, document, next_step, text
 from bemt.judge.compare.matched import stand_run
@@ -135,6 +136,10 @@ def compare(
         raise InputError(Fault(names[0], "", "the same recording twice", expected, _two_choices(names[0])))
     read: list[Dataset] = at_once(partial(_read, a, names[0], rows_a, air_a, "--air-a", run or {}),
                                   partial(_read, b, names[1], rows_b, air_b, "--air-b", run or {}))  # fmt: skip
+    if all(f"rpm: {IGNORED} rpm" in imported.notes for imported in read):
+        raise InputError(
+            Fault("--rpm", "", "two files with a speed of their own", "a file without one", "Leave it out")
+        )
     D = rotor.diameter_m if rotor is not None and D is None else D
     rho = None if rotor is None else float(rotor.air().rho)
     findings = [_findings(imported, D, rotor is not None and rotor.ducted, rho) for imported in read]
@@ -167,7 +172,7 @@ def _read(given: Any, name: str, rows: Sequence[str], air: str | None, option: s
     """A recording as the user states it."""
     if is_table(given):
         told = as_stated([given], {k: v for k, v in run.items() if k != "rpm"})[0]
-        made = from_pandas(told, name=name) if hasattr(told, "columns") else cast(Dataset, told)
+        made = filled(from_pandas(told, name=name) if hasattr(told, "columns") else cast(Dataset, told), run.get("rpm"))
     else:
         made = one_as_stated(name, run)
     return with_air(selected(made, list(rows), name), air, option)
@@ -189,7 +194,9 @@ def compared(
     """One CFD run beside a case, two grids of a run, two CFD runs, or two recordings; written if a folder is given."""
     found: Contrast | Told
     tables = is_table(a) or is_table(b)
+    of_two = {"--air-a": air_a, "--air-b": air_b, "--ruled-out": ruled_out, "--changed": changed}
     if b is None:
+        refuse(_unused({"--rows-a": rows_a, "--rows-b": rows_b, **of_two}, "one file, beside a case"))
         if case is None:
             inside = between_setups(one_as_stated(a, run or {}), a) if is_measured(a) else []
             pair = " ".join(["bemt compare", *inside, *options_of(stated_options(run or {}))])
@@ -199,6 +206,7 @@ def compared(
         one = one_run.compare_run(as_stated([a], run or {})[0], case, progress, file=typed)
         found = Told(one.document(), one_run.text(one), one_run.text(one, details=True))
     elif not tables and (runs := two_runs.compare_runs(a, b, rows_a, rows_b, run or {})) is not None:
+        refuse(_unused(of_two, "two runs of CFD, of which no cause is named"))
         found = Told(runs.document(), runs.text)
     else:
         found = compare(a, b, case, label=label, diameter_m=diameter_m, rows_a=rows_a, rows_b=rows_b, air_a=air_a,
@@ -207,6 +215,11 @@ def compared(
         beside = case if figures and not (rows_a or rows_b or air_a or air_b) else None
         _write(Path(out), found, figures, [name for name in (a, b) if name is not None], beside)
     return found
+
+
+def _unused(given: Mapping[str, Any], here: str) -> list[Fault]:
+    """Options that are of no use here."""
+    return [Fault(option, "", here, "two recordings of measurements") for option, value in given.items() if value]
 
 
 def _write(out: Path, found: Contrast | Told, figures: bool, files: Sequence[str], case: Any) -> None:
