@@ -122,7 +122,8 @@ def worded(function: Callable[P, T]) -> Callable[P, T]:
         ...
     TypeError: solve() got 'airspeed'. Did you mean airspeed_m_s?
 
-    A quantity may be given in another unit that its suffix names: ``airspeed_km_h=72``.
+    A quantity may be given in another unit that its suffix names: ``airspeed_km_h=72``. One thing counts as a sequence
+    of it, a number of numpy as one of Python, and None as the default.
     """
     code = function.__code__
     names = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
@@ -130,9 +131,13 @@ def worded(function: Callable[P, T]) -> Callable[P, T]:
     cells = tuple(name for name, kind in kinds.items() if "Cells" in kind)
     counts = (*cells, *(name for name, kind in kinds.items() if "Count" in kind))
     choices = {name: found for name, kind in kinds.items() if (found := choices_of(kind))}
+    usual = dict(zip(reversed(names[: code.co_argcount]), reversed(function.__defaults__ or ()), strict=False))
+    usual |= function.__kwdefaults__ or {}
 
     @functools.wraps(function)
     def call(*args: P.args, **more: P.kwargs) -> T:
+        from bemt.base.given import declared
+
         if any(name not in names for name in more):
             from bemt.base.other_units import in_own_units
 
@@ -141,7 +146,9 @@ def worded(function: Callable[P, T]) -> Callable[P, T]:
             near = did_you_mean(unknown[0], names) or f" It takes {', '.join(n for n in names if n != 'self')}."
             raise TypeError(f"{function.__name__}() got {unknown[0]!r}.{near}")
         given = dict(zip(names, args, strict=False)) | more
+        given = {name: usual.get(name) if value is None else value for name, value in given.items()}
         given |= {name: cells_of(given[name]) for name in cells if name in given}
+        given |= {name: declared(name, kinds[name], given[name]) for name in given if name in kinds}
         first: Any = (*(given[name] for name in names[: len(args)]), *args[len(names) :])
         named: Any = {name: given[name] for name in more}
         check_counts(counts, given)
@@ -190,7 +197,7 @@ def check_choices(choices: Mapping[str, tuple[str, ...]], given: Mapping[str, An
     for name, known in choices.items():
         value = given.get(name)
         for one in value if isinstance(value, (list, tuple)) else [value]:
-            if one is not None and one not in known:
+            if one is not None and not (isinstance(one, str) and one in known):
                 near = did_you_mean(str(one), known).strip()
                 faults.append(Fault("", name, repr(one), f"one of {', '.join(filter(None, known))}", near))
     if faults:

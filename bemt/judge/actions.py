@@ -132,7 +132,7 @@ def diagnose(
 
 @action(
     "Recordings", "compare monday.csv tuesday.csv --case cases/prop_8x5", words=("a", "b"), shown=True,
-    common=("case", "label", "rows_a", "rows_b", "air_a", "air_b", "ruled_out", "changed", "out"),
+    common=("case", "rows_a", "rows_b", "air_a", "air_b", "ruled_out", "changed", "out"),
     elsewhere=dict.fromkeys(("--density-kg-m3", "--airspeed-m-s"), "Each run has its own: --air-a 1.19kg/m3,5m/s."),
 )  # fmt: skip
 def compare(
