@@ -622,6 +622,25 @@ def test_a_stated_speed_is_that_of_the_file_without_one_or_refused(tmp_path: Pat
         compare(own, twice, run={"rpm": 6000.0})
 
 
+def test_every_point_that_is_not_compared_is_said_with_its_line_and_why(tmp_path: Path) -> None:
+    """Counts of a table alone do not say which points they lack."""
+    a, b = stand(1), stand(1001)
+    for table in (a, b):
+        table["thrust_N"][0] = 0.001
+    b["torque_Nm"][5] = b["rpm"][7] = math.nan
+    b["rpm"][-1] = 1.3 * a["rpm"][-1]
+    answer = compare(written(tmp_path / "a.csv", a), written(tmp_path / "b.csv", b))
+    told = [note for note in answer.document["notes"] if note.startswith("not compared, ")]
+    missing, zero, beyond = told
+    assert "no number: " in missing and "line 9 of B (thrust)" in missing and "lines 7, 9 of B (torque)" in missing
+    assert "near zero" in zero and zero.endswith("line 2 of A and B (thrust)")
+    assert f"{b['rpm'][-1]:.0f} rev/min of B (thrust, torque)" in beyond
+    assert all(note in answer.text for note in told)
+    full = compare(*pair(tmp_path, scaled()))
+    assert full.document["ratios"]["thrust_N"]["points"] == [17, 17]
+    assert not [note for note in full.document["notes"] if note.startswith("not compared")]
+
+
 def test_options_of_a_pair_are_refused_beside_one_file(tmp_path: Path) -> None:
     a = written(tmp_path / "a.csv", stand(1))
     for given in ({"changed": ["propeller"]}, {"ruled_out": ["duct"]}, {"rows_a": ["rpm=4000:6000"]}, {"air_a": "20C"}):

@@ -386,6 +386,7 @@ def _notes(
 ) -> list[str]:  # fmt: skip
     other = cfd_setup.other_setup(a.setup, b.setup)
     out = [f"computed otherwise: {other}"] if other else []
+    out += matched.words_of_left_out([*channels.values()])
     out += [_misread(letter, run) for letter, run in (("A", a), ("B", b)) if run.misread[0]]
     out += [note for c in channels.values() for note in c.notes]
     out += [
