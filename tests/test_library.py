@@ -412,7 +412,7 @@ def test_a_word_or_an_object_that_is_none_is_named(call: Callable[[], object], w
     assert words in str(error.value)
 
 
-def test_one_thing_is_a_sequence_of_it_and_what_fits_no_parameter_is_refused() -> None:
+def test_one_thing_is_a_sequence_of_it_and_what_fits_no_parameter_is_refused(tmp_path: Path) -> None:
     """Every parameter of every action, given what people have at hand."""
     one = KnownMotor("mine", 920.0, 0.1, 0.5)
     odd = (one, Path("a.csv"), np.float64(5.0), np.int64(5), np.array(5.0), np.array([5.0, 6.0]), pd.Series(["duct"]),
@@ -446,6 +446,15 @@ def test_one_thing_is_a_sequence_of_it_and_what_fits_no_parameter_is_refused() -
     assert (
         bemt.choose(8.0, 3, labels=pd.Series(["10x4.5"]), kv=np.array([900.0]), blades=None).table.kv.iloc[0] == 900.0
     )
+    with pytest.raises(bemt.InputError, match=r"label: got int 5.*\nrpm: got str 'x'") as several:
+        bemt.compare(FRAME, FRAME, rpm="x", label=5)
+    assert len(several.value.faults) == 2
+    for point in (KnownMotor, np.float64(5.0), Path("a.csv")):
+        with pytest.raises(bemt.InputError, match=r"points\[0\]"):
+            bemt.design(points=point)
+    (tmp_path / "taken").write_text("")
+    with pytest.raises(bemt.InputError, match="taken: got File exists"):
+        bemt.choose(8.0, 3, labels="10x4.5", kv=900.0, out=tmp_path / "taken")
     with pytest.raises(bemt.InputError, match="^motors: got DataFrame"):
         bemt.choose(8.0, 3, motors=FRAME)
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
-from bemt.base.errors import EXIT_OK, Fault, InputError, refuse
+from bemt.base.errors import EXIT_OK, Fault, InputError, gathered, refuse, system_fault
 
 __all__ = [
     "Answered", "Declaration", "Cells", "Count", "Told", "about", "action", "choices_of", "did_you_mean", "in_words",
@@ -148,13 +148,22 @@ def worded(function: Callable[P, T]) -> Callable[P, T]:
         given = dict(zip(names, args, strict=False)) | more
         given = {name: usual.get(name) if value is None else value for name, value in given.items()}
         given |= {name: cells_of(given[name]) for name in cells if name in given}
-        given |= {name: declared(name, kinds[name], given[name]) for name in given if name in kinds}
+        faults: list[Fault] = []
+        for name in given.keys() & kinds.keys():
+            with gathered(faults):
+                given[name] = declared(name, kinds[name], given[name])
+        refuse(sorted(faults, key=lambda fault: names.index(fault.where)))
         first: Any = (*(given[name] for name in names[: len(args)]), *args[len(names) :])
         named: Any = {name: given[name] for name in more}
         check_counts(counts, given)
         check_choices(choices, given)
         with in_words_of_the_library():
-            return function(*first, **named)
+            try:
+                return function(*first, **named)
+            except OSError as error:  # a folder that is a file; libraries have no word of the system
+                if error.strerror:
+                    raise InputError(system_fault(error)) from error
+                raise
 
     return call
 
