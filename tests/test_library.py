@@ -17,7 +17,7 @@ import pandas as pd
 import pytest
 
 import bemt
-from bemt.base.given import declared
+from bemt.base.arguments import declared
 from bemt.physics.effects import catalogue, source_of
 from bemt.rotors.case import load_case
 from bemt.rotors.case.prepare import prepare_case

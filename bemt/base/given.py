@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Set
-from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -14,74 +12,7 @@ from bemt.base.arrays import Array
 from bemt.base.cache import cache_dir
 from bemt.base.errors import Fault, InputError
 
-__all__ = ["declared", "number", "numbers", "path_text"]
-
-
-_PATHS = ("Path", "File", "StrPath", "str | os.PathLike[str]")
-"""Annotations of the path of a file or folder."""
-
-
-def declared(name: str, kind: str, value: Any) -> Any:
-    """Argument of a parameter as its annotation has it, or a refusal; what an annotation leaves open stays.
-
-    >>> declared("off", "Sequence[str]", "duct"), declared("rpm", "float | None", np.array(6000.0))
-    (['duct'], 6000.0)
-    >>> declared("label", "str | None", 5)
-    Traceback (most recent call last):
-        ...
-    bemt.base.errors.InputError: label: got int 5; expected text.
-    """
-    one, many, _ = kind.partition("Sequence[")
-    plain = kind.removesuffix(" | None")
-    if value is None and (plain != kind or plain not in (*_PATHS, "float", "int", "str")):
-        return value
-    if many:
-        value = _several(one, value)
-    if plain in ("float", "int", "Count", "Cells", "tuple[float, float] | float"):
-        value = value.tolist() if hasattr(value, "tolist") and np.size(value) == 1 else value
-        value = value[0] if isinstance(value, list) and len(value) == 1 else value
-    expected, fits = "", True
-    if plain in ("float", "int"):
-        expected, fits = "a number", isinstance(value, Real) and not isinstance(value, bool)
-    elif "tuple[float, float]" in plain and not many:
-        pair = value.tolist() if hasattr(value, "tolist") else value
-        expected, fits = "a number, or two", _numbers(pair if isinstance(pair, (list, tuple)) else [pair])
-        value = tuple(pair) if fits and isinstance(pair, list) else pair
-    elif plain in _PATHS and not isinstance(value, str):
-        path_text(name, value)
-    elif plain == "str":
-        expected, fits = "text", isinstance(value, str)
-    elif plain in ("Sequence[str]", "str | Sequence[str]"):
-        each = value if isinstance(value, (list, tuple)) else [value]
-        expected, fits = "text, or several", all(isinstance(v, str) for v in each)
-    elif "Mapping[str," in plain and "Recording" not in plain:
-        # a line of the shell is one as well: thrust=N
-        each = value if isinstance(value, (list, tuple)) else [value]
-        expected = "a mapping, as {'thrust': 'N'}" if plain == "Mapping[str, str]" else "text or a mapping"
-        fits = isinstance(value, Mapping) or all(isinstance(v, str) for v in each)
-        value = [value] if plain == "Mapping[str, str]" and isinstance(value, str) else value
-    if not fits:
-        raise InputError(Fault("", name, _shown(value), expected))
-    return value
-
-
-def _several(one: str, value: Any) -> Any:
-    """What stands for a sequence as a list; text and paths that the annotation allows alone stay."""
-    if isinstance(value, (list, tuple)) or (one and isinstance(value, (str, os.PathLike))):
-        return value
-    if hasattr(value, "tolist") and not hasattr(value, "columns"):
-        value = value.tolist()
-        return value if isinstance(value, list) else [value]
-    return list(value) if isinstance(value, (Set, Iterator, range)) else [value]
-
-
-def _numbers(values: Any) -> bool:
-    return len(values) in (1, 2) and all(isinstance(v, Real) and not isinstance(v, bool) for v in values)
-
-
-def _shown(value: Any) -> str:
-    """Type and start of a value."""
-    return f"{type(value).__name__} {' '.join(repr(value).split()):.40}"
+__all__ = ["number", "numbers", "path_text"]
 
 
 def numbers(name: str, value: Any, finite: bool = True) -> Array:
@@ -107,7 +38,8 @@ def path_text(name: str, value: Any) -> str:
     if isinstance(value, (str, os.PathLike)) and os.fspath(value):
         return os.fspath(value)
     hint = "A table is read already: compare and diagnose take it" if hasattr(value, "columns") else ""
-    raise InputError(Fault("", name, _shown(value), "the path of a file or folder", hint))
+    got = f"{type(value).__name__} {' '.join(repr(value).split()):.40}"
+    raise InputError(Fault("", name, got, "the path of a file or folder", hint))
 
 
 def number(name: str, value: Any, finite: bool = True) -> float:

@@ -141,29 +141,6 @@ def _cell(name: str, value: float, digits: int) -> str:
     return tables.number_text(float(value) if math.isfinite(value) else None, digits)
 
 
-_WORDS = {"thrust_N": "thrust", "torque_Nm": "torque", "power_W": "shaft power",
-          "electrical_power_W": "electrical power", "CT": "CT", "CP": "CP", "CQ": "CQ"}  # fmt: skip
-"""Loads, in a sentence."""
-
-
-def _range(points: Dataset) -> list[str]:
-    """Speeds, or advance ratios or throttle where no speed is told, of some points."""
-    for name, unit in (("rpm", " rev/min"), ("J", " of advance ratio"), ("throttle", " of full throttle")):
-        seen = points.values.get(name, np.zeros(0))
-        if np.isfinite(seen).any():
-            ends = (f"{f(seen):.{0 if name == 'rpm' else 2}f}" for f in (np.nanmin, np.nanmax))
-            return [f"{' to '.join(dict.fromkeys(ends))}{unit}"]
-    return []
-
-
-def _gaps(record: Dataset) -> list[str]:
-    """Channels that lack a number in some rows, each with its lines."""
-    gone = {k: np.flatnonzero(~np.isfinite(v)) for k, v in record.values.items()}
-    lines = [str(n) for n in record.lines] or [str(k + 1) for k in range(len(record))]
-    return [f"{record.headings.get(k) or k} (line{'s' * (at.size > 1)} {tables.some([lines[i] for i in at], 4)})"
-            for k, at in gone.items() if 0 < at.size < len(record)]  # fmt: skip
-
-
 def dropped_words(how: Reduction) -> Iterator[str]:
     """What was left out, with its lines, a reason a line."""
     reasons: dict[tuple[str, str], list[tuple[int, int]]] = {}
@@ -235,16 +212,9 @@ class ImportedFile:
         points = self.record if self.curve else self.reduced
         if self.record is None or not isinstance(points, Dataset):
             return ""
-        loads = [words for k, words in _WORDS.items() if k in points and np.isfinite(points[k]).any()]
-        loads = [words for words in loads if words != "shaft power" or "torque" not in loads]
-        listed = " and ".join(filter(None, [", ".join(loads[:-1]), *loads[-1:]])) or "no load"
-        told = [tables.number_of(len(points), "point"), *_range(points), listed]
-        wrong, doubt = ([f.channel for f in self.findings if f.severity == kind] for kind in ("error", "warning"))
-        gaps = _gaps(self.record) if self.curve or reduction(points).mode == "points" else []
-        parts = (("cannot be right:", wrong), ("in doubt:", doubt), ("no number in", gaps))
-        open_ = [f"{words} {tables.some(dict.fromkeys(some), 4)}" for words, some in parts if some]
-        open_ += ["not all of it is read, see Next"] if self.step else []
-        return f"{', '.join(told)}; {'; '.join(open_) or 'nothing contradicts itself'}."
+        from bemt.data.recordings.first_sentence import sentence
+
+        return sentence(self.record, points, self.findings, bool(self.step))
 
     def document(self) -> dict[str, Any]:
         """Plain values."""

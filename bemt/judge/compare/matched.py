@@ -497,12 +497,12 @@ def words_of_left_out(channels: Iterable[MatchedChannel]) -> list[str]:
             for one in (k for k in c.left if k.why == why):
                 of.setdefault((one.letter, one.where), []).append(_SHORT.get(c.name, c.name))
         both: dict[tuple[tuple[str, ...], tuple[str, ...]], list[str]] = {}
-        for (letter, where), names in of.items():
-            both.setdefault((where, tuple(names)), []).append(letter)
+        for (letter, where), own in of.items():
+            both.setdefault((where, tuple(own)), []).append(letter)
         told = []
         for (where, names), letters in both.items():
-            lines = where[0] if why == "beyond" else f"line{'s' if len(where) > 1 else ''} {some(where, 4)}"
-            told.append(f"{lines} of {' and '.join(letters)} ({', '.join(names)})")
+            at = where[0] if why == "beyond" else f"line{'s' if len(where) > 1 else ''} {some(where, 4)}"
+            told.append(f"{at} of {' and '.join(letters)} ({', '.join(names)})")
         out += [f"not compared, {words}: {'; '.join(told)}"] if told else []
     return out
 
