@@ -13,11 +13,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+import bemt
 from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.data.recordings.load import import_file
@@ -29,7 +31,7 @@ from bemt.judge.compare.matched import StandRun, stand_run
 from bemt.judge.compare.recordings import RunChange
 from bemt.judge.compare.smooth_change import Ratio
 from bemt.judge.diagnose.by_laws import changed
-from bemt.judge.diagnose.contrast import compare
+from bemt.judge.diagnose.contrast import Contrast, compare
 from bemt.judge.diagnose.law_rotor import CoefficientCurve
 from bemt.physics.dataset import Dataset
 from bemt.physics.effects import catalogue
@@ -567,7 +569,94 @@ def test_the_printed_command_runs_with_the_rotor_that_was_chosen(
     assert words[1:6] == ["compare", *files, "--rows-b", "rotor=right"]
     assert main([*words[1:6], "--rows-b", "speed_ratio=0.95:1.05"]) == 0
     again = next(line for line in capsys.readouterr().out.splitlines() if "bemt" in line)
-    assert {"rotor=right", "speed_ratio=0.95:1.05", "CASE"} <= set(shlex.split(again))
+    words = shlex.split(again)
+    assert {"rotor=right", "speed_ratio=0.95:1.05", "--ruled-out"} <= {*words}
+    assert main([*words[1:], "--json"]) == 0
+    assert words[-1] not in json.loads(capsys.readouterr().out)["effects"]
+
+
+def test_what_the_user_knows_is_weighed_without_a_case_as_well(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As in `diagnose`: a check ruled one cause out, and another one was changed on purpose."""
+    a, b = pair(tmp_path, scaled(thrust_N=0.85, torque_Nm=1.05), seed=3)
+
+    def probability(answer: Contrast, name: str) -> float:
+        return sum(r["probability"] for r in answer.document["ranking"] if name in r["effect"].split("+"))
+
+    plain = compare(a, b)
+    gone, cause = compare(a, b, ruled_out=[plain.effects[0]]), "propeller"
+    assert plain.effects[0] not in gone.effects and not probability(gone, plain.effects[0])
+    told = compare(a, b, changed=[cause])
+    assert told.effects[0] == cause and probability(told, cause) > 5.0 * probability(plain, cause)
+    step = told.document["next_measurement"]
+    typed = shlex.split(step["command"])
+    assert step["checks"] == cause and typed[-2:] == ["--ruled-out", cause] and "--changed" not in typed
+    assert main([*typed[1:], "--json"]) == 0
+    assert cause not in json.loads(capsys.readouterr().out)["effects"]
+    both = compare(a, b, str(CASES / "prop_10x5"), changed=[cause], ruled_out=["thrust_gain"])
+    assert "thrust_gain" not in both.effects and both.document["diagnosis"]["verdict"] == both.verdict
+    for given, words in (
+        ({"changed": ["propeler"]}, "Did you mean propeller"), ({"changed": ["stall_delay"]}, "--case CASE --changed"),
+        ({"ruled_out": [cause], "changed": [cause]}, "is changed as well"),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=words):
+            compare(a, b, **given)
+
+
+def test_a_stated_speed_is_that_of_the_file_without_one_or_refused(tmp_path: Path) -> None:
+    """Files of a tunnel state J, and their speed in the name."""
+    J = np.linspace(0.0, 0.6, 9)
+    tables = {"a.csv": {"J": J, "thrust_N": 3.0 - 4.0 * J}, "b.csv": {"J": J, "thrust_N": 3.3 - 4.4 * J}}
+    a, b = (written(tmp_path / name, table) for name, table in tables.items())
+    own = written(tmp_path / "c.csv", {**tables["b.csv"], "rpm": np.full(9, 6000.0)})
+    stated = compare(a, b, label="10x5", run={"rpm": 6000.0})
+    assert [*stated.document["ratios"]] == ["thrust_N"]
+    assert stated.document["ratios"]["thrust_N"]["ratio"] == pytest.approx(1.1, rel=1e-3)
+    one, two = (compare(a, c, label="10x5", run={"rpm": 6000.0}).document["ratios"] for c in (b, own))
+    assert one["thrust_N"]["ratio"] == pytest.approx(two["thrust_N"]["ratio"])
+    frame = pd.DataFrame(tables["b.csv"])
+    assert bemt.compare(a, frame, label="10x5", rpm=6000.0).document["ratios"].keys() == one.keys()
+    twice = written(tmp_path / "d.csv", {**tables["a.csv"], "rpm": np.full(9, 6000.0)})
+    with pytest.raises(InputError, match="two files with a speed of their own"):
+        compare(own, twice, run={"rpm": 6000.0})
+
+
+def test_every_point_that_is_not_compared_is_said_with_its_line_and_why(tmp_path: Path) -> None:
+    """Counts of a table alone do not say which points they lack."""
+    a, b = stand(1), stand(1001)
+    for table in (a, b):
+        table["thrust_N"][0] = 0.001
+    b["torque_Nm"][5] = b["rpm"][7] = math.nan
+    b["rpm"][-1] = 1.3 * a["rpm"][-1]
+    answer = compare(written(tmp_path / "a.csv", a), written(tmp_path / "b.csv", b))
+    told = [note for note in answer.document["notes"] if note.startswith("not compared, ")]
+    missing, zero, beyond = told
+    assert "no number: " in missing and "line 9 of B (thrust)" in missing and "lines 7, 9 of B (torque)" in missing
+    assert "near zero" in zero and zero.endswith("line 2 of A and B (thrust)")
+    assert f"{b['rpm'][-1]:.0f} rev/min of B (thrust, torque)" in beyond
+    assert all(note in answer.text for note in told)
+    full = compare(*pair(tmp_path, scaled()))
+    assert full.document["ratios"]["thrust_N"]["points"] == [17, 17]
+    assert not [note for note in full.document["notes"] if note.startswith("not compared")]
+
+
+def test_options_of_a_pair_are_refused_beside_one_file(tmp_path: Path) -> None:
+    a = written(tmp_path / "a.csv", stand(1))
+    for given in ({"changed": ["propeller"]}, {"ruled_out": ["duct"]}, {"rows_a": ["rpm=4000:6000"]}, {"air_a": "20C"}):
+        with pytest.raises(InputError, match=f"{next(iter(given))}: got one file"):
+            bemt.compare(a, case="10x5", **given)
+
+
+def test_a_drive_that_is_ruled_out_is_no_cause(tmp_path: Path) -> None:
+    """Motor and battery are no effects on the rotor, and are ruled out by their names as well."""
+    a, b = (stand(k) | {"throttle": np.linspace(0.3, 1.0, 17)} for k in (1, 1001))
+    b["rpm"], b["thrust_N"], b["torque_Nm"] = 0.9 * b["rpm"], 0.81 * b["thrust_N"], 0.81 * b["torque_Nm"]
+    files = written(tmp_path / "a.csv", a), written(tmp_path / "b.csv", b)
+    assert "battery_sag" in compare(*files).effects
+    left = compare(*files, ruled_out=["battery_sag"]).effects
+    assert "motor" in left and "battery_sag" not in left
+    assert compare(*files, changed=["motor"]).effects[0] == "motor"
 
 
 def test_turned_blades_of_the_quick_start_are_among_the_causes(
@@ -921,3 +1010,6 @@ def test_the_same_thrust_per_watt_at_another_voltage_is_said_first(tmp_path: Pat
         assert first.startswith("Same thrust per watt (") and first.endswith(said)
     else:
         assert first.startswith("No change beyond") and "voltage" not in first
+    step = answer.document["next_measurement"]
+    assert ("repeat B with the battery" in step["text"]) is bool(words)
+    assert not words or step["command"] == f"bemt compare {files[0]} B_AGAIN.csv"

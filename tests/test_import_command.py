@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import bemt
@@ -248,7 +249,7 @@ def test_import_takes_the_speed_that_diagnose_takes(put: Callable[..., Path]) ->
         f"{v * 9.5493:.6g},{9e-6 * v**1.98:.6g},{1.3e-7 * v * v:.6g},10,{2e-9 * v**3:.6g}\n" for v in n
     )
     lines = import_files([str(put("strong.csv", strong))]).text().splitlines()
-    assert "power_above_input" in lines[1]
+    assert "power_above_input" in lines[3] and "cannot be right: torque x speed" in lines[1]
 
 
 @pytest.mark.parametrize(("heads", "air"), [
@@ -270,7 +271,7 @@ def test_fahrenheit_under_celsius_is_an_error_that_says_so(put: Callable[..., Pa
     rows = "".join(f"{v:g},{8e-8 * v**2:.6g},{1.3e-9 * v**2.01:.6g},64.4,985\n" for v in n)
     path = put("air.csv", f"rpm,thrust (N),torque (Nm),air temperature (C),air pressure (hPa)\n{rows}")
     text = import_files([str(path)]).text()
-    assert "64.4 F is 18 C" in text and "Fahrenheit taken for Celsius" in text.splitlines()[1]
+    assert "64.4 F is 18 C" in text and "Fahrenheit taken for Celsius" in text.splitlines()[2]
 
 
 def test_a_sign_turns_the_load_that_the_reader_sees_whatever_it_is_headed(tmp_path: Path) -> None:
@@ -421,6 +422,29 @@ def test_the_next_step_is_one_that_goes_on(
         Path("b.csv").write_text("\n".join([head, *rows[1:], ""]), encoding="utf-8")
         assert main(["compare", "a.csv", "b.csv"]) == 2
         assert "a.csv: got no load and no speed" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda table: table, "9 points, 4000 to 8000 rev/min, thrust and torque; nothing contradicts itself."),
+        (lambda table: table.assign(torque_Nm=9.80665 * table.torque_Nm), "; in doubt: "),
+        (lambda table: table.assign(volts=12.0, amps=6e-4 * table.rpm), "torque x speed."),
+        (lambda table: table.assign(thrust_N=table.thrust_N.where(table.rpm < 7800.0)),
+         "no number in thrust_N (line 10)."),
+    ],
+    ids=["sound", "unit", "power", "cell"],
+)  # fmt: skip
+def test_it_says_first_whether_a_recording_is_sound(
+    tmp_path: Path, change: Callable[[pd.DataFrame], pd.DataFrame], words: str
+) -> None:
+    n = np.arange(4000.0, 8001.0, 500.0)
+    table = pd.DataFrame({"thrust_N": np.round(8.6e-8 * n**2.02, 3), "torque_Nm": np.round(1.3e-9 * n**2, 4), "rpm": n})
+    change(table).to_csv(tmp_path / "run.csv", index=False)
+    answer = bemt.import_(tmp_path / "run.csv")
+    said, *_ = " ".join(answer.text.splitlines()[1:3]).partition(" channels:")
+    assert said.split()[:2] == ["9", "points,"] and words in " ".join(said.split())
+    assert ("nothing contradicts" in said) is words.endswith("itself.")
 
 
 @pytest.mark.parametrize(

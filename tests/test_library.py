@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import pydoc
 import re
@@ -9,17 +10,20 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
 import bemt
+from bemt.base.arguments import declared
 from bemt.physics.effects import catalogue, source_of
 from bemt.rotors.case import load_case
 from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.case.sources import Source, Sources, bibtex
 from bemt.rotors.population import population
+from bemt.tools.design.motors_file import KnownMotor
 
 SPEEDS = np.arange(4000.0, 9001.0, 500.0)
 FRAME = pd.DataFrame({"rpm": SPEEDS, "thrust_N": 1e-7 * SPEEDS**2})
@@ -406,6 +410,53 @@ def test_a_word_or_an_object_that_is_none_is_named(call: Callable[[], object], w
     with pytest.raises(bemt.InputError) as error:
         call()
     assert words in str(error.value)
+
+
+def test_one_thing_is_a_sequence_of_it_and_what_fits_no_parameter_is_refused(tmp_path: Path) -> None:
+    """Every parameter of every action, given what people have at hand."""
+    one = KnownMotor("mine", 920.0, 0.1, 0.5)
+    odd = (one, Path("a.csv"), np.float64(5.0), np.int64(5), np.array(5.0), np.array([5.0, 6.0]), pd.Series(["duct"]),
+           pd.Series([5.0]), FRAME, {"thrust_N": "N"}, {"duct"}, (k for k in ["duct"]), "duct", True, None,
+           object())  # fmt: skip
+    fits: dict[str, Callable[[Any], bool]] = {
+        "float": lambda v: isinstance(v, (int, float)) and not isinstance(v, bool), "str": lambda v: isinstance(v, str),
+        "Path": lambda v: isinstance(v, (str, Path)),
+        "Sequence[str]": lambda v: isinstance(v, (list, tuple)) and all(isinstance(k, str) for k in v),
+        "Mapping[str, str]": lambda v: isinstance(v, (dict, list)),
+        "Path | Sequence[Path | KnownMotor]": lambda v: isinstance(v, (str, Path, list)),
+    }  # fmt: skip
+    seen = 0
+    for function in (f for f in map(bemt.__getattr__, bemt._homes()) if hasattr(f, "about")):
+        kinds = getattr(inspect.unwrap(function), "__annotations__", {})
+        for name, kind in ((k, str(v)) for k, v in kinds.items() if k != "return"):
+            for value in odd:
+                try:
+                    found = declared(name, kind, value)
+                except bemt.InputError as error:
+                    assert f"{name}: got " in str(error)
+                    continue
+                seen += 1
+                plain = kind.removesuffix(" | None")
+                by_default = value is None and (plain != kind or plain not in ("float", "str", "Path"))
+                assert by_default or plain not in fits or fits[plain](found), (name, value)
+    assert seen > 500
+    with pytest.raises(bemt.InputError, match="^changed: propeler: got an unknown effect"):
+        bemt.diagnose(FRAME, "10x5", changed="propeler")
+    assert bemt.choose(8.0, 3, labels="10x4.5", motors=one).table.motor.tolist() == ["mine"]
+    assert (
+        bemt.choose(8.0, 3, labels=pd.Series(["10x4.5"]), kv=np.array([900.0]), blades=None).table.kv.iloc[0] == 900.0
+    )
+    with pytest.raises(bemt.InputError, match=r"label: got int 5.*\nrpm: got str 'x'") as several:
+        bemt.compare(FRAME, FRAME, rpm="x", label=5)
+    assert len(several.value.faults) == 2
+    for point in (KnownMotor, np.float64(5.0), Path("a.csv")):
+        with pytest.raises(bemt.InputError, match=r"points\[0\]"):
+            bemt.design(points=point)
+    (tmp_path / "taken").write_text("")
+    with pytest.raises(bemt.InputError, match="taken: got File exists"):
+        bemt.choose(8.0, 3, labels="10x4.5", kv=900.0, out=tmp_path / "taken")
+    with pytest.raises(bemt.InputError, match="^motors: got DataFrame"):
+        bemt.choose(8.0, 3, motors=FRAME)
 
 
 def test_frames_are_compared_as_files_are(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import bemt
 from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.data import readers
@@ -322,6 +323,22 @@ def test_a_column_named_for_its_quantity_keeps_the_unit_in_its_brackets(tmp_path
     file.write_text(HEADED.format(speed="RPM", thrust="Thurst (g)", torque="Torque (Nm)"))
     (read,) = as_stated([str(file)], {"column": ["thrust=Thurst (g)"]})
     assert np.allclose(read.thrust_N, 9.80665e-3 * np.array([200, 310, 450, 610]))
+
+
+@pytest.mark.parametrize("mark", [";", "\t", "  "])
+def test_decimal_commas_without_headings_are_read_as_points_are(tmp_path: Path, mark: str) -> None:
+    """Which column is which the user says."""
+    rows = [(4000.5, 1.1, 0.016), (6000.0, 2.4, 0.034), (8000.0, 4.3, 0.061)]
+    found = {}
+    for name, decimal in (("points", "."), ("commas", ",")):
+        cells = (mark.join(f"{v:.3f}" for v in row).replace(".", decimal) for row in rows)
+        (tmp_path / f"{name}.txt").write_text("\n".join(cells) + "\n", encoding="utf-8")
+        kept = tmp_path / f"{name}.toml"
+        bemt.import_(tmp_path / f"{name}.txt", column={"rpm": "1", "thrust": "2", "torque": "3"},
+                     unit={"rpm": "rpm", "thrust": "N", "torque": "Nm"}, out=kept)  # fmt: skip
+        found[name] = bemt.read(kept)
+    assert found["commas"].thrust_N.tolist() == found["points"].thrust_N.tolist() == [1.1, 2.4, 4.3]
+    assert found["commas"].rpm[0] == 4000.5 and found["commas"].torque_Nm[2] == 0.061
 
 
 def test_a_lone_point_among_decimal_commas_is_refused_with_its_place(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
-from bemt.base.errors import EXIT_OK, Fault, InputError, refuse
+from bemt.base.errors import EXIT_OK, Fault, InputError, refuse, system_fault
 
 __all__ = [
     "Answered", "Declaration", "Cells", "Count", "Told", "about", "action", "choices_of", "did_you_mean", "in_words",
@@ -99,7 +99,7 @@ def action(
 
     def declare(function: Callable[P, T]) -> Callable[P, T]:
         name = command or function.__name__.replace("_", "-")
-        found = worded(function)
+        found = worded(function, checked=True)
         setattr(found, "about", Declaration(name, group, example, words, common, shown, elsewhere or {}))  # noqa: B010
         return found
 
@@ -112,7 +112,7 @@ def about(function: Callable[..., Any]) -> Declaration:
     return found
 
 
-def worded(function: Callable[P, T]) -> Callable[P, T]:
+def worded(function: Callable[P, T], checked: bool = False) -> Callable[P, T]:
     """Function that suggests the right keyword, checks counts and choices, and names parameters in its faults.
 
     >>> @worded
@@ -122,7 +122,8 @@ def worded(function: Callable[P, T]) -> Callable[P, T]:
         ...
     TypeError: solve() got 'airspeed'. Did you mean airspeed_m_s?
 
-    A quantity may be given in another unit that its suffix names: ``airspeed_km_h=72``.
+    A quantity may be given in another unit that its suffix names: ``airspeed_km_h=72``. Where arguments are ``checked``
+    by their annotations, one thing counts as a sequence of it, and None as the default.
     """
     code = function.__code__
     names = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
@@ -130,9 +131,13 @@ def worded(function: Callable[P, T]) -> Callable[P, T]:
     cells = tuple(name for name, kind in kinds.items() if "Cells" in kind)
     counts = (*cells, *(name for name, kind in kinds.items() if "Count" in kind))
     choices = {name: found for name, kind in kinds.items() if (found := choices_of(kind))}
+    usual = dict(zip(reversed(names[: code.co_argcount]), reversed(function.__defaults__ or ()), strict=False))
+    usual |= function.__kwdefaults__ or {}
 
     @functools.wraps(function)
     def call(*args: P.args, **more: P.kwargs) -> T:
+        from bemt.base.arguments import as_declared, check_choices
+
         if any(name not in names for name in more):
             from bemt.base.other_units import in_own_units
 
@@ -141,7 +146,9 @@ def worded(function: Callable[P, T]) -> Callable[P, T]:
             near = did_you_mean(unknown[0], names) or f" It takes {', '.join(n for n in names if n != 'self')}."
             raise TypeError(f"{function.__name__}() got {unknown[0]!r}.{near}")
         given = dict(zip(names, args, strict=False)) | more
+        given = {name: usual.get(name) if value is None else value for name, value in given.items()}
         given |= {name: cells_of(given[name]) for name in cells if name in given}
+        given = as_declared(given, kinds) if checked else given
         first: Any = (*(given[name] for name in names[: len(args)]), *args[len(names) :])
         named: Any = {name: given[name] for name in more}
         check_counts(counts, given)
@@ -182,19 +189,6 @@ def choices_of(kind: str) -> tuple[str, ...]:
     """
     found = re.search(r"Literal\[(.*?)\]", kind)
     return tuple(re.findall(r"[\"']([^\"']*)[\"']", found[1])) if found else ()
-
-
-def check_choices(choices: Mapping[str, tuple[str, ...]], given: Mapping[str, Any]) -> None:
-    """Refuse words that are none of those declared."""
-    faults = []
-    for name, known in choices.items():
-        value = given.get(name)
-        for one in value if isinstance(value, (list, tuple)) else [value]:
-            if one is not None and one not in known:
-                near = did_you_mean(str(one), known).strip()
-                faults.append(Fault("", name, repr(one), f"one of {', '.join(filter(None, known))}", near))
-    if faults:
-        raise InputError(faults)
 
 
 def did_you_mean(got: str, known: Iterable[str], most: int = 2) -> str:
@@ -278,6 +272,10 @@ def in_words_of_the_library(keys: dict[str, str] | None = None, file: str = "") 
         if faults == list(error.faults):
             raise
         raise InputError(faults) from None
+    except OSError as error:  # a folder that is a file; libraries have no word of the system
+        if error.strerror:
+            raise InputError(system_fault(error)) from error
+        raise
 
 
 def _named(fault: Fault, keys: dict[str, str], file: str) -> Fault:

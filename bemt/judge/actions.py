@@ -132,16 +132,16 @@ def diagnose(
 
 @action(
     "Recordings", "compare monday.csv tuesday.csv --case cases/prop_8x5", words=("a", "b"), shown=True,
-    common=("case", "label", "rows_a", "rows_b", "air_a", "air_b", "out"),
+    common=("case", "rows_a", "rows_b", "air_a", "air_b", "ruled_out", "changed", "out"),
     elsewhere=dict.fromkeys(("--density-kg-m3", "--airspeed-m-s"), "Each run has its own: --air-a 1.19kg/m3,5m/s."),
 )  # fmt: skip
 def compare(
     a: Recording, b: Recording | None = None, *, case: Propeller | Path | None = None, label: str | None = None,
     diameter_m: float | None = None, rows_a: Sequence[str] = (), rows_b: Sequence[str] = (), air_a: str | None = None,
-    air_b: str | None = None, rpm: float | None = None, unit: Mapping[str, str] = {},  # noqa: B006
-    column: Mapping[str, str] = {}, sign: Mapping[str, str] = {}, pole_pairs: Count | None = None,  # noqa: B006
-    zones: Sequence[str] = (), out: Path | None = None, figures: bool = True,
-    progress: Callable[[str], None] | None = None,
+    air_b: str | None = None, ruled_out: Sequence[str] = (), changed: Sequence[str] = (),
+    rpm: float | None = None, unit: Mapping[str, str] = {}, column: Mapping[str, str] = {},  # noqa: B006
+    sign: Mapping[str, str] = {}, pole_pairs: Count | None = None, zones: Sequence[str] = (),  # noqa: B006
+    out: Path | None = None, figures: bool = True, progress: Callable[[str], None] | None = None,
 ) -> Contrast | Told:  # fmt: skip
     r"""Say what changed between two recordings, or compare one CFD run with BEMT.
 
@@ -162,8 +162,12 @@ def compare(
         Rows of `a` or `b` to use: column=text, column=number, column=low:high, rotor=left.
     air_a, air_b : str, optional
         Air of `a` or `b`, overrides the recording: 22C,1013hPa, or only 22C, or 1.19kg/m3; wind: 18m/s, 35kt.
+    ruled_out : sequence of str
+        Effects that a check has ruled out.
+    changed : sequence of str
+        Effects that you changed, such as propeller ("these are two propellers"): said, weighed, checked.
     rpm : float, optional
-        Speed of exports of CFD, or of one file beside the case, where no file states it. [rev/min]
+        Speed of files without one, tables or exports of CFD. [rev/min]
     unit : mapping
         Unit of a quantity or heading of both tables, or of one CFD run, that states none: thrust=N.
     column : mapping
@@ -216,9 +220,9 @@ def compare(
     two = b if b is None or is_table(b) else path_text("b", b)
     return contrast.compared(
         one, two, case, label=label, diameter_m=diameter_m, rows_a=rows_a, rows_b=rows_b, air_a=air_a, air_b=air_b,
-        out=None if out is None else path_text("out", out), figures=figures, progress=progress,
-        run={"rpm": rpm, "unit": words(unit), "column": words(column), "sign": words(sign), "pole_pairs": pole_pairs,
-             "zones": list(zones)},
+        ruled_out=ruled_out, changed=changed, out=None if out is None else path_text("out", out), figures=figures,
+        progress=progress, run={"rpm": rpm, "unit": words(unit), "column": words(column), "sign": words(sign),
+                                "pole_pairs": pole_pairs, "zones": list(zones)},
     )  # fmt: skip
 
 

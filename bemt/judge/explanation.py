@@ -10,7 +10,11 @@ from typing import Any
 from bemt.base.document import Documented
 from bemt.physics import effects
 
-__all__ = ["DOUBT", "NONE", "UNKNOWN", "Explanation", "KindPrior", "Size", "Sizes"]
+__all__ = ["CHANGED", "DOUBT", "NONE", "UNKNOWN", "Explanation", "KindPrior", "Size", "Sizes"]
+
+
+CHANGED = 50.0
+"""Weight, in the prior, of an effect that the user says he changed: said, weighed, checked [1]."""
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.tables import few
-from bemt.data.readers import head_text, load_text, number
+from bemt.data.readers import head_text, load_text
 from bemt.data.readers._large import NumberTable, large_table
 from bemt.data.readers._words import NEUTRAL, english
 from bemt.data.readers.headings import USUAL, Heading, counts_electrical, heading, may_be, slug
@@ -32,6 +32,7 @@ from bemt.data.readers.split import (
     find_start,
     heading_cells,
     is_comment,
+    is_number,
     split_line,
     split_table,
     with_unit,
@@ -72,12 +73,12 @@ def sniff(head: bytes | str) -> bool:
     if len(lines) < 2:
         return False
     split = [split_line(t, mark) for t in lines[:50]]
-    if mark == " " and any(len(c) < 2 or sum(number(x) is not None for x in c) < 0.8 * len(c) for c in split[1:20]):
+    if mark == " " and any(len(c) < 2 or sum(map(is_number, c)) < 0.8 * len(c) for c in split[1:20]):
         return False
     split[0] = heading_cells(lines[0], mark, len(split[1]))
     width = len(split[0])
     alike = sum(abs(len(cells) - width) <= 1 for cells in split[1:])
-    numbers = sum(any(number(c) is not None or re.fullmatch(r"[+-]?\d+,\d+", c) for c in row) for row in split[1:])
+    numbers = sum(any(map(is_number, row)) for row in split[1:])
     return width > 1 and min(alike, numbers) >= 0.5 * (len(split) - 1)
 
 

@@ -166,11 +166,16 @@ def find_delimiter(lines: Sequence[str]) -> str:
 
     >>> find_delimiter(["r;mm,x", "1,2"]), find_delimiter(["a;b", "1,5;2,5"]), find_delimiter(["1 2", "3 4"])
     (',', ';', ' ')
+    >>> find_delimiter(["4000,5 1,10", "6000,1 2,40"]), find_delimiter(["4000, 1", "6000, 2"])
+    (' ', ',')
     """
     plain = [re.sub(r'"[^"]*"', "", line) for line in lines]
     least = len(plain) if any(" " in line.strip() for line in plain) else len(plain) // 2 + 1
     usual = [mark for mark in DELIMITERS if plain and mark in plain[0] and sum(mark in t for t in plain) >= least]
-    return max(usual, key=lambda mark: all(mark in t for t in plain), default=" ")
+    found = max(usual, key=lambda mark: all(mark in t for t in plain), default=" ")
+    blanks = [line.split() for line in lines]
+    decimal = found == "," and all(len(cells) > 1 and all(map(is_number, cells)) for cells in blanks)
+    return " " if decimal else found
 
 
 def _heads(names: Sequence[str], rows: Iterable[Sequence[str]]) -> bool:
@@ -208,11 +213,14 @@ def find_start(lines: Sequence[str]) -> tuple[int, str]:
     return _below_a_block(lines, usual) or (0, usual)
 
 
+def is_number(cell: str) -> bool:
+    """Whether a cell is a number, with a point or a comma."""
+    return number(cell) is not None or _COMMA.fullmatch(cell) is not None
+
+
 def _reads(cell: str) -> bool:
     """Whether a cell is a number, in whatever way it is written."""
-    return number(cell) is not None or bool(
-        cell and (_COMMA.fullmatch(cell) or _GROUPED.fullmatch(cell) or with_unit(cell))
-    )
+    return is_number(cell) or bool(cell and (_GROUPED.fullmatch(cell) or with_unit(cell)))
 
 
 def with_unit(cell: str) -> tuple[str, str] | None:
@@ -276,7 +284,7 @@ def decimal_mark(table: SplitTable) -> str:
     thousands = all(_THOUSANDS.fullmatch(cell) for cell in commas)
     if commas and thousands and any(not re.fullmatch(r"[+-]?\d{1,3}\.\d{3}", cell) for cell in points):
         return ".,"
-    if not table.headings or thousands or (points and table.delimiter == ","):
+    if thousands or (points and table.delimiter == ","):
         return "."
     grouped = all(_GROUPED.fullmatch(cell) for cell in points)
     return "," if grouped and all(_COMMA.fullmatch(cell) for cell in commas) else "."
@@ -366,7 +374,7 @@ def split_table(
         notes[:1] = [f"{comments} comment lines left out"] if comments else []
         notes.append(f"the headings are the comment in line {said[0]}")
     top, first = split[0]
-    header = not any(number(c) is not None for c in first) if header is None else header
+    header = not any(map(is_number, first)) if header is None else header
     if header and len(split) > 1 and top == used[0][0]:
         first = heading_cells(used[0][1], mark, len(split[1][1]))
     first = _of_labview(first, above, mark)

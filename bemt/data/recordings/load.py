@@ -179,8 +179,8 @@ def as_stated(files: Sequence[Any], run: Mapping[str, Any]) -> list[Any]:
 
 
 def one_as_stated(file: str, run: Mapping[str, Any]) -> Dataset:
-    """One of two recordings as stated; a speed is that of exports of CFD, as tables of measurements have it."""
-    told = as_stated([file], {k: v for k, v in run.items() if k != "rpm" or not is_measured(file)})[0]
+    """One of two recordings as stated; a speed is that of files without one."""
+    told = as_stated([file], run)[0]
     return told if isinstance(told, Dataset) else import_file(file)
 
 

@@ -200,6 +200,22 @@ class ImportedFile:
         """Command that states what it leaves open of its loads or its speed; empty where nothing is."""
         return "" if self.record is None else self.record.provenance.get("step", "")
 
+    @property
+    def curve(self) -> bool:
+        """Whether its rows are coefficients, points as they stand."""
+        record = self.record
+        return bool(record and self.reduced is None and not record.clock and {"CT", "CP", "CQ"} & record.values.keys())
+
+    @property
+    def sentence(self) -> str:
+        """What a recording holds and whether it contradicts itself; "" for what is none."""
+        points = self.record if self.curve else self.reduced
+        if self.record is None or not isinstance(points, Dataset):
+            return ""
+        from bemt.data.recordings.first_sentence import sentence
+
+        return sentence(self.record, points, self.findings, bool(self.step))
+
     def document(self) -> dict[str, Any]:
         """Plain values."""
         record = self.record
@@ -227,9 +243,9 @@ class ImportedFile:
             f"  ! {f.severity}: {f.id} in {f.channel}: {f.evidence}. Suggestion: {f.correction}" for f in self.findings
         ]
         errors = [text for f, text in zip(self.findings, told, strict=True) if f.severity == "error"]
-        curve = self.reduced is None and not self.record.clock and bool({"CT", "CP", "CQ"} & self.record.values.keys())
-        lines = [self.title, *errors, *self._channels_text(self.record, {} if curve else self.means)]
-        lines += points_text(self.reduced) if self.reduced is not None else _curve(self.record) if curve else []
+        first = textwrap.wrap(self.sentence, 110, initial_indent="  ", subsequent_indent="    ")
+        lines = [self.title, *first, *errors, *self._channels_text(self.record, {} if self.curve else self.means)]
+        lines += points_text(self.reduced) if self.reduced is not None else _curve(self.record) if self.curve else []
         step = self.step.partition("   (")[0]  # it stands under Next
         lines += [f"  {'.' if isinstance(w, Remark) else '!'} {w}" for w in self.warnings if not step or step not in w]
         lines += [text for text in told if text not in errors]

@@ -29,6 +29,8 @@ from bemt.physics.dataset import Dataset
 
 _BY_UNIT = ("thrust", "torque", "rpm", "voltage", "current", "airspeed", "density", "pressure")
 """Quantities that their unit alone stands for."""
+IGNORED = "ignored, the file has"
+"""What is said of a value that a file states itself, before the channel."""
 
 
 def _unit(quantity: str, text: str) -> str | None:
@@ -262,7 +264,7 @@ def filled(
             continue
         if own is None:
             told[name] = np.full(len(imported), float(value))
-        notes.append(f"{name}: {value:g} as given" if own is None else f"{name}: ignored, the file has {own}")
+        notes.append(f"{name}: {value:g} as given" if own is None else f"{name}: {IGNORED} {own}")
     values = {**imported.values, **told}
     units = {k: unit for k, unit in imported.units.items() if k not in told}
     return replace(imported, values=values, units=units, notes=(*imported.notes, *notes)) if notes else imported

@@ -37,8 +37,7 @@ SCHEMA = "bemt.comparison/1"
 _FIRST = 5.0
 # Change of a load that days of one site can make, and from which on it is worth a thermometer, in ln.
 _DAY, _SEEN = 0.12, 0.03
-# Start of a verdict that rests on what both recordings state.
-_TOLD = (*recordings.AS_RECORDED, "voltage as recorded")
+_ONE_BATTERY = "to compare at one voltage, repeat B with the battery or supply of A"
 # Scatter of readings at one speed, share, that no stand has: something else changes from reading to reading.
 _RESTLESS = 0.10
 _REPEAT = "repeat the run of A and compare it with A: so much two runs differ by without a cause"
@@ -47,19 +46,24 @@ _STEPS = 2  # that are offered at once
 
 def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
     """Run or reading that would settle the answer, and the command to give then, with all that was asked."""
-    said = change.leading
+    said, checks = change.leading, ""
     if change.other_setup and said.verdict in ("none", "insufficient"):
         text, command = ONE_SETUP, ""
+    elif said.why.startswith(recordings.VOLTS_AS_RECORDED) or said.why.endswith(recordings.ONLY_VOLTS):
+        text, command = _ONE_BATTERY, asked.command(b="B_AGAIN.csv")
     elif said.verdict == "none":
         text, command = _to_see_more(change, asked)
-    elif said.why.startswith(_TOLD):
+    elif said.why.startswith(recordings.AS_RECORDED):
         text, command = "", ""
     elif said.verdict in ("named", "sensor"):
-        check = next(filter(None, map(check_of, said.effects)), "read the label of the channel")
-        text, command = f"to be sure, {check}", asked.command(case=asked.case or "CASE")
+        checks = next(filter(check_of, said.effects), "")
+        text = f"to be sure, {check_of(checks) or 'read the label of the channel'}"
+        command = asked.without(checks) if checks else asked.command(case=asked.case or "CASE")
+    elif lacking := _lacking(change, asked):
+        text, command = lacking
     else:
-        text, command = _lacking(change, asked) or _quickest_checks(change, asked)
-    return {"text": text, "command": command}
+        text, command, checks = _quickest_checks(change, asked)
+    return {"text": text, "command": command, "checks": checks}
 
 
 def _of_days(change: RunChange, least: float) -> bool:
@@ -109,18 +113,18 @@ def _lacking(change: RunChange, asked: Invocation) -> tuple[str, str] | None:
     return None
 
 
-def _quickest_checks(change: RunChange, asked: Invocation) -> tuple[str, str]:
-    """Checks that find the cause soonest, one of each family; or the run of A again."""
+def _quickest_checks(change: RunChange, asked: Invocation) -> tuple[str, str, str]:
+    """Checks that find the cause soonest, one of each family, or the run of A again; and the cause looked for first."""
     said = change.leading
     members = [k for k in said.effects if check_of(k)]
     order = checks_by_worth(said.ranked, minutes("reference", len(change.a.points)))
     firsts: dict[str, str] = {}
     for cause in [k for k in order if k in members or said.verdict != "class"] or members:
-        firsts.setdefault(FAMILY.get(cause, cause), check_of(cause) if cause else _REPEAT)
-    told = [*firsts.values()][:_STEPS] or [_REPEAT]
+        firsts.setdefault(FAMILY.get(cause, cause), cause)
+    causes = [*firsts.values()][:_STEPS] or [""]
     again = {"b": "A_AGAIN.csv", "rows_b": asked.rows_a, "air_b": asked.air_a}
-    command = asked.command(**again if told[0] == _REPEAT else {"case": asked.case or "CASE"})
-    return "; or ".join(told), command
+    command = asked.without(causes[0]) if causes[0] else asked.command(**again)
+    return "; or ".join(check_of(k) if k else _REPEAT for k in causes), command, causes[0]
 
 
 def _unrepeatable(change: RunChange) -> str:
@@ -368,6 +372,8 @@ def _said(doc: ComparedRuns) -> list[str]:
            *_of_miscount(doc), *_of_drive(doc), *([f"Next: {text}."] if text else [])]  # fmt: skip
     out = [textwrap.fill(line, 110, initial_indent="  ", subsequent_indent="    ") for line in out]
     if command:
+        checks = "" if doc.diagnosis else doc.next_measurement.get("checks")
+        out += [f"    if {title_of(checks)} is ruled out:"] if checks else []
         out += [f"    {t.strip()}" for t in told if t.lstrip().startswith("if ")]
         out.append(f"    {command}")
     return out

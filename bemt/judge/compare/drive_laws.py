@@ -113,6 +113,7 @@ LAWS: tuple[DriveLaw, ...] = (
     ),
 )  # fmt: skip
 """Causes behind the rotor."""
+NAMES = tuple(row.id for row in LAWS)
 _EACH = (1.0 - sum(_PRIOR.values())) / len(LAWS)
 
 
@@ -236,15 +237,19 @@ def _columns(row: DriveLaw, channels: Mapping[str, MatchedChannel], form: float)
 
 
 def weigh(
-    channels: Mapping[str, MatchedChannel], scatters: Sequence[Mapping[str, Scatter]], load: Load
+    channels: Mapping[str, MatchedChannel], scatters: Sequence[Mapping[str, Scatter]], load: Load,
+    weight: Mapping[str, float] | None = None,
 ) -> dict[Explanation, float]:  # fmt: skip
     """Probability of what changed beside the load, the likeliest first; ``scatters``: settings of single readings'.
 
-    Where both voltages are recorded, "none" is nothing but these.
+    Where both voltages are recorded, "none" is nothing but these. ``weight`` of each cause, 1 by default.
     """
     found = [_weighed(channels, scatter, load) for scatter in scatters]
-    score = {k: float(log_sum([z[k] for z in found])) for k in found[0]}
-    log_prior = {k: math.log(_PRIOR.get(k, _EACH)) for k in score}
+    share_of = {i: (weight or {}).get(i, 1.0) for i in NAMES}
+    each = (1.0 - sum(_PRIOR.values())) / (sum(share_of.values()) or 1.0)
+    prior = {**_PRIOR, **{Explanation.of(i): each * w for i, w in share_of.items()}}
+    score = {k: float(log_sum([z[k] for z in found])) for k in found[0] if prior[k] > 0.0}
+    log_prior = {k: math.log(prior[k]) for k in score}
     share = shares([score[k] + log_prior[k] for k in score]).tolist()
     return dict(sorted(zip(score, share, strict=True), key=lambda kv: -kv[1]))
 

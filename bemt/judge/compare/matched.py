@@ -8,14 +8,16 @@ over ln n and advance ratio.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
+from bemt.base.tables import some
 from bemt.data.recordings import cfd_setup
 from bemt.data.recordings.channels import THROTTLE_IS_PULSE, in_one_step, moves, named, throttle_of
 from bemt.data.recordings.reduce import reduce, reduction
@@ -84,7 +86,7 @@ def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> 
     rho, warm = (values.get(k, np.array([constant[k]])) for k in ("density_kg_m3", "temperature_K"))
     warm = warm[(warm > COLD) & (warm < HOT)]
     points = Dataset(
-        series.kind, name, values, {k: series.u[k] for k in values if k in series},
+        series.kind, name, values, {k: series.u[k] for k in values if k in series}, labels=series.labels,
         notes=(*ramp, *(n for n in series.notes if "no density" not in n)),
         units={"command": "s" if command == "pwm_s" else "-"},
     )  # fmt: skip
@@ -244,6 +246,21 @@ MARGIN = 0.06
 _ONE_SPEED = 0.02
 
 
+class LeftOut(NamedTuple):
+    """Readings of one channel of one recording that are not compared."""
+
+    why: str
+    letter: str  # A or B
+    where: tuple[str, ...]  # Lines of the file, or a range
+
+
+WHY_LEFT = {
+    "none": "no number", "zero": "so near zero that they say nothing of the rotor",
+    "beyond": "beyond the range that both have",
+}  # fmt: skip
+"""Why readings are not compared."""
+
+
 @dataclass(frozen=True, eq=False)
 class MatchedChannel:
     """One channel of both recordings."""
@@ -263,6 +280,7 @@ class MatchedChannel:
     # (N,) standard deviation of the shift of a run by lag or hysteresis, share of full scale [1]
     shift: Array | None = None
     turned: bool = False  # Whether B has the other sign
+    left: tuple[LeftOut, ...] = ()  # What is not compared
 
     def common(self) -> tuple[float, float]:
         """Range of the first coordinate that both recordings have; low above high: none."""
@@ -313,7 +331,7 @@ class _Readings:
     u: Array
     run: Array
     sign: float
-    lost: int  # Points near zero that were left out
+    left: Mapping[str, tuple[str, ...]]  # Lines that are not compared, by the reason
 
 
 def _readings(run: StandRun, name: str, channel: str, diameter: float) -> _Readings | None:
@@ -344,12 +362,16 @@ def _readings(run: StandRun, name: str, channel: str, diameter: float) -> _Readi
         good &= scaled > _NEAR_ZERO * level
     if good.sum() < 2:
         return None
+    missing = ~(np.isfinite(v) & np.isfinite(speed) & (np.isfinite(run.points.command) if over_command else True))
+    lines = [label.rpartition(":")[2] for label in run.points.labels] or [f"{k + 1}" for k in range(len(run))]
+    left = {why: tuple(lines[k] for k in np.flatnonzero(here))
+            for why, here in (("none", missing), ("zero", ~good & ~missing))}  # fmt: skip
     stated = run.points.u[channel] / size
     still = over_command or name in WITHOUT_SPEED
     x = np.column_stack([first, np.zeros(len(run)) if still else advance(run, diameter)])
     runs = run.points.values.get("run", np.zeros(len(run)))
     return _Readings(np.log(scaled[good]), x[good], top / size[good], np.nan_to_num(stated[good]), runs[good], sign,
-                     int((~good).sum()))  # fmt: skip
+                     left)  # fmt: skip
 
 
 def _averaged(part: _Readings) -> _Readings:
@@ -385,8 +407,8 @@ def matched(a: StandRun, b: StandRun, name: str, diameter: float) -> MatchedChan
         return None
     turned = one.sign != two.sign
     notes = [f"{channel}: changed sign between A and B; sizes are compared"] if turned else []
-    notes += [f"{channel}: {part.lost} of {len(run)} points of {letter} left out: near zero"
-              for part, run, letter in ((one, a, "A"), (two, b, "B")) if part.lost > 0.5 * len(run)]  # fmt: skip
+    left = [LeftOut(why, letter, where) for letter, part in (("A", one), ("B", two))
+            for why, where in part.left.items() if where]  # fmt: skip
     one, two = _averaged(one), _averaged(two)
     if name in OVER_COMMAND and a.by_throttle and b.by_throttle:  # as both were typed
         one, two = (replace(part, x=np.column_stack([throttle_of(part.x[:, 0]), part.x[:, 1]])) for part in (one, two))
@@ -399,6 +421,7 @@ def matched(a: StandRun, b: StandRun, name: str, diameter: float) -> MatchedChan
         name, channel, np.concatenate([one.y, two.y - log_density]), x,
         np.repeat([False, True], [one.y.size, two.y.size]), np.concatenate([runs, more + runs.max() + 1]), floor, u,
         log_density, math.hypot(max(_set_up(name, channel, a, b), *seen), unsure), tuple(notes), shift, turned,
+        tuple(left),
     )  # fmt: skip
 
 
@@ -451,4 +474,38 @@ def in_common(c: MatchedChannel) -> MatchedChannel:
         margin = MARGIN * float(np.ptp(c.x[:, 1]))
         keep &= (c.x[:, 1] >= slow - margin) & (c.x[:, 1] <= fast + margin)
     enough = min(keep[c.second].sum(), keep[~c.second].sum()) >= 2
-    return taken(c, keep) if low <= high and enough else c
+    if low > high or not enough:
+        return c
+    return replace(taken(c, keep), left=(*c.left, *_beyond(c, keep)))
+
+
+def _beyond(c: MatchedChannel, keep: NDArray[np.bool_]) -> Iterator[LeftOut]:
+    """Speeds at which one of two recordings alone was."""
+    for letter, mine in (("A", ~c.second), ("B", c.second)):
+        n = np.exp(c.x[mine & ~keep, 0])
+        if n.size and c.name in (*LOADS, "electrical"):
+            ends = dict.fromkeys(f"{v:.0f}" for v in (n.min(), n.max()))
+            yield LeftOut("beyond", letter, (f"{' to '.join(ends)} rev/min",))
+
+
+def words_of_left_out(channels: Iterable[MatchedChannel]) -> list[str]:
+    """A line for each reason for which readings are not compared, with their lines and channels."""
+    out = []
+    for why, words in WHY_LEFT.items():
+        of: dict[tuple[str, tuple[str, ...]], list[str]] = {}
+        for c in channels:
+            for one in (k for k in c.left if k.why == why):
+                of.setdefault((one.letter, one.where), []).append(_SHORT.get(c.name, c.name))
+        both: dict[tuple[tuple[str, ...], tuple[str, ...]], list[str]] = {}
+        for (letter, where), own in of.items():
+            both.setdefault((where, tuple(own)), []).append(letter)
+        told = []
+        for (where, names), letters in both.items():
+            at = where[0] if why == "beyond" else f"line{'s' if len(where) > 1 else ''} {some(where, 4)}"
+            told.append(f"{at} of {' and '.join(letters)} ({', '.join(names)})")
+        out += [f"not compared, {words}: {'; '.join(told)}"] if told else []
+    return out
+
+
+_SHORT = {"electrical": "electrical power", "at_power": "thrust", "at_command": "thrust"}
+"""Channels in words, where their name is none."""

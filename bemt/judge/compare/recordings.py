@@ -6,7 +6,7 @@ No case and no blade is needed. What is not recorded is assumed to be equal in b
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -21,13 +21,15 @@ from bemt.judge.compare import drive_laws, matched
 from bemt.judge.compare import smooth_change as fits
 from bemt.judge.compare.drive_laws import Judgement, Load
 from bemt.judge.compare.matched import LOADS, MatchedChannel, StandRun, advance, density_change
-from bemt.judge.explanation import NONE, Size
+from bemt.judge.explanation import CHANGED, NONE, Size
 from bemt.judge.loss import SECOND, Decision, decide, joined, parts
 
 REVERSED = "thrust has the other sign in B, and its size is the same"
 """Verdict of a reversed cell, or of a rotor that is mounted or turns the other way round."""
 AS_RECORDED = ("density as recorded", "by the thermometers")
 """Starts of the reason of a density that both files state."""
+VOLTS_AS_RECORDED = "voltage as recorded"
+"""Start of the reason of a voltage that both files state."""
 ERROR_IN = ("error in ", "warning in ")
 """Start of a note on what cannot be so in A or B."""
 # Recorded densities are this good: a barometer, a thermometer and nobody's humidity, share.
@@ -69,6 +71,9 @@ class RunChange:
     judge: Callable[[RunChange], Judgement]  # Of the loads
     assumed: tuple[str, ...] = ()  # What neither recording says
     notes: tuple[str, ...] = field(default=())  # What was left out
+    # What the user knows: effects that a check has ruled out, and that he changed
+    gone: frozenset[str] = frozenset()
+    told: frozenset[str] = frozenset()
 
     @cached_property
     def loads(self) -> Judgement:
@@ -121,15 +126,17 @@ class RunChange:
             return NO_VERDICT
         if _unloaded(self.a, self.b, self.diameter_m):
             return replace(NO_VERDICT, why="the advance ratios differ, and the drive follows the load")
-        P = drive_laws.weigh(self.behind.channels, (self.behind.free, self.behind.steady), self._load(self._miscount))
-        if not self._by_volts:
+        weight = {i: CHANGED if i in self.told else 0.0 if i in self.gone else 1.0 for i in drive_laws.NAMES}
+        scatters = self.behind.free, self.behind.steady
+        P = drive_laws.weigh(self.behind.channels, scatters, self._load(self._miscount), weight)
+        if not self._by_volts or self.gone & drive_laws.SUPPLY.ids:
             return drive_laws.judge_drive(P)
         # known from the files: what is left is whether something else changed as well
         ratio = math.exp(self._by_volts)
         said = drive_laws.judge_drive({k | drive_laws.SUPPLY: p * (1.0 if k == NONE else SECOND) for k, p in P.items()})
         if said.effects != tuple(drive_laws.SUPPLY):
             return said
-        why = f"voltage as recorded, {ratio - 1.0:+.1%} at equal command; the speed goes with it"
+        why = f"{VOLTS_AS_RECORDED}, {ratio - 1.0:+.1%} at equal command; the speed goes with it"
         return replace(said, parameters={"battery_sag": {"ratio": Size(ratio, ratio, ratio, "1")}}, why=why)
 
     @property
@@ -271,10 +278,15 @@ def _by_power(power_W: Array, volts: Array) -> tuple[Array, Array]:
     return power_W[good][order], volts[good][order]
 
 
-def changed(a: StandRun, b: StandRun, diameter_m: float, judge: Callable[[RunChange], Judgement]) -> RunChange:
-    """Compare two recordings; ``judge`` says what acts on the rotor."""
-    told = [d for d in (diameter_m, a.diameter_m, b.diameter_m) if math.isfinite(d)]
-    diameter = told[0] if told else math.nan
+def changed(
+    a: StandRun, b: StandRun, diameter_m: float, judge: Callable[[RunChange], Judgement], gone: Collection[str] = (),
+    told: Collection[str] = (),
+) -> RunChange:  # fmt: skip
+    """Compare two recordings; ``judge`` says what acts on the rotor.
+
+    Effects are ``gone`` that a check has ruled out; the user changed what he has ``told``.
+    """
+    diameter = next((d for d in (diameter_m, a.diameter_m, b.diameter_m) if math.isfinite(d)), math.nan)
     rotor = fits.prepared(a, b, tuple(LOADS), diameter)
     used = {c.channel for c in rotor.channels.values()}
     behind = fits.prepared(a, b, [k for k, names in matched.DRIVE.items() if not used & set(names)], diameter)
@@ -298,7 +310,8 @@ def changed(a: StandRun, b: StandRun, diameter_m: float, judge: Callable[[RunCha
     ratios = {c.channel: fits.ratio_of(c, scatter[n]) for n, c in channels.items()}
     assumed = tuple(_assumed(a, b, diameter, rotor.channels))
     notes = tuple(_notes(a, b, channels, {**rotor.strays, **behind.strays}))
-    return RunChange(a, b, diameter, channels, ratios, rotor, behind, judge, assumed, notes)
+    return RunChange(a, b, diameter, channels, ratios, rotor, behind, judge, assumed, notes, frozenset(gone),
+                     frozenset(told))  # fmt: skip
 
 
 def _not_converted(a: StandRun, b: StandRun, diameter: float) -> list[Fault]:
@@ -373,6 +386,7 @@ def _notes(
 ) -> list[str]:  # fmt: skip
     other = cfd_setup.other_setup(a.setup, b.setup)
     out = [f"computed otherwise: {other}"] if other else []
+    out += matched.words_of_left_out([*channels.values()])
     out += [_misread(letter, run) for letter, run in (("A", a), ("B", b)) if run.misread[0]]
     out += [note for c in channels.values() for note in c.notes]
     out += [

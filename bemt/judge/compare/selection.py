@@ -324,6 +324,8 @@ class Invocation:
     case: str | None = None  # Case of the rotor
     diameter_m: float | None = None  # Of the rotor [m]
     stated: Mapping[str, Sequence[str]] = field(default_factory=dict)  # Of the columns: unit, column and sign
+    ruled_out: tuple[str, ...] = ()  # Effects that a check has ruled out
+    changed: tuple[str, ...] = ()  # Effects that the user says he changed
 
     @property
     def chosen(self) -> bool:
@@ -343,8 +345,15 @@ class Invocation:
         options = {"--air-a": given.air_a, "--air-b": given.air_b, "--label": given.label, "--case": given.case}
         words += [word for option, text in options.items() if text is not None for word in (option, text)]
         size = [] if given.diameter_m is None else [given.diameter_m]
-        more = options_of({"diameter-m": size, **given.stated})
+        known = {"changed": given.changed, "ruled-out": given.ruled_out}
+        more = options_of({"diameter-m": size, **given.stated, **known})
         return " ".join(["bemt compare", *(shlex.quote(word) for word in words), *more])
+
+    def without(self, cause: str) -> str:
+        """Command that asks this after a check has ruled a cause out."""
+        out = cause.split("+")
+        left = tuple(k for k in self.changed if k not in out)
+        return self.command(changed=left, ruled_out=(*self.ruled_out, *out))
 
     def with_rows(self, letter: str, column: str) -> str:
         """Command that also chooses a range of one column of A or B; LOW and HIGH are the user's to fill in."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from bemt.base.action import Told
 from bemt.base.errors import Fault, InputError, refuse, system_fault
-from bemt.base.given import number, path_text
+from bemt.base.given import number, numbers, path_text
 from bemt.data.recordings.grids import together
 from bemt.data.recordings.load import as_stated, import_file, stated_options
 from bemt.data.recordings.shown import options_of
@@ -149,19 +149,19 @@ def diagnosed(
     run: Mapping[str, Any],
 ) -> Answer | OnePoint:  # fmt: skip
     """Diagnose, and write what is asked; parameters as `bemt.diagnose`."""
-    only, channels = ([v] if isinstance(v, str) else list(v) for v in (only, channels))
     given, files = sorted_out(several(case), several(recordings))
     known = several(reference)
     _both_there(given, files, known, reference_case, repeatability_pct, top_rpm)
     target = None if out is None else path_text("out", out)
     theirs = None if reference_case is None else cases_of([reference_case], off, 1)[0]
-    flow = {k: np.atleast_1d(np.asarray(v, dtype=float)).tolist()
+    flow = {k: numbers(k, v, finite=False).ravel().tolist() if np.size(v) else []
             for k, v in (("rpm", rpm), ("airspeed_m_s", airspeed_m_s), ("density_kg_m3", density_kg_m3))}  # fmt: skip
     speeds = flow["rpm"]
     stated = as_stated(files, {**run, **({"rpm": speeds[0]} if len(speeds) == 1 and any(run.values()) else {})})
     known_of = known if run["zones"] else as_stated(known, run)
-    cases, records = load_all(stated, given, known_of, off, only, before=lambda found: folder.check(target, found),
-                              ruled_out=[*ruled_out, *changed], reference_case=theirs, **flow)  # fmt: skip
+    said = {"--only": only, "--ruled-out": ruled_out, "--changed": changed}
+    cases, records = load_all(stated, given, known_of, off, said, before=lambda found: folder.check(target, found),
+                              reference_case=theirs, **flow)  # fmt: skip
     repeats = np.nan if repeatability_pct is None else repeatability_pct / 100.0
     records = [replace(r, repeatability=repeats, top_rpm=np.inf if top_rpm is None else top_rpm) for r in records]
     chosen = cases * len(stated) if len(cases) == 1 else cases

@@ -61,15 +61,17 @@ def law_effects() -> list[str]:
     ]  # fmt: skip
 
 
-def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange:
+def changed(
+    a: StandRun, b: StandRun, diameter_m: float = math.nan, gone: Collection[str] = (), told: Collection[str] = ()
+) -> RunChange:  # fmt: skip
     """Compare two recordings; what acts on the rotor is judged when it is asked for."""
-    return recordings.changed(a, b, diameter_m, judged)
+    return recordings.changed(a, b, diameter_m, judged, gone, told)
 
 
-def judged(pair: RunChange, only: Collection[str] | None = None, gone: Collection[str] = ()) -> Judgement:
-    """What changed the loads from A to B; ``only`` these effects, without what is ``gone``."""
+def judged(pair: RunChange, only: Collection[str] | None = None) -> Judgement:
+    """What changed the loads from A to B; ``only`` these effects."""
     with posterior.one_thread():
-        found = weighed(pair, only, gone)
+        found = weighed(pair, only)
         if found is None:
             return recordings.NO_VERDICT
         P = _factored(found, pair)
@@ -108,9 +110,7 @@ def _factored(found: posterior.Evidence, pair: RunChange) -> dict[Explanation, f
     return {**kept, DOUBT: 1.0 - sum(kept.values())}
 
 
-def weighed(
-    pair: RunChange, only: Collection[str] | None = None, gone: Collection[str] = ()
-) -> posterior.Evidence | None:  # fmt: skip
+def weighed(pair: RunChange, only: Collection[str] | None = None) -> posterior.Evidence | None:
     """Explanations of what changed from A to B, weighed; None where nothing can be."""
     both = records_of(pair)
     if both is None:
@@ -121,8 +121,8 @@ def weighed(
         rotor = LawRotor.of(known, pair.diameter_m, laws)
         return law_part(test, rotor), law_part(known, rotor)
 
-    problem = replace(assemble(parts(LAWS)), variants=tuple(map(parts, VARIANTS)))
-    names = [i for i in law_effects() if (only is None or i in only) and i not in gone]
+    problem = replace(assemble(parts(LAWS)), variants=tuple(map(parts, VARIANTS)), told=pair.told)
+    names = [i for i in law_effects() if (only is None or i in only) and i not in pair.gone]
     candidates, _ = signatures.candidates(problem, names)
     # what two thermometers leave open of the density counts as repeatability
     thermometers = density_change(pair.a, pair.b)[1]

@@ -57,8 +57,9 @@ def diagnose(
     def compared(absent: Collection[str]) -> RunChange | None:
         if channels is not None or baseline != "bemt":
             return None
-        judged = partial(by_laws.judged, only=only, gone=given.ruled_out)
-        return change or knowledge.change_of(records, each[0].diameter_m, absent, judged)
+        judged = partial(by_laws.judged, only=only)
+        known = given.ruled_out, given.changed
+        return change or knowledge.change_of(records, each[0].diameter_m, absent, judged, *known)
 
     def chain(
         some: Sequence[tuple[Record, Case]], ids: Sequence[str] | None,

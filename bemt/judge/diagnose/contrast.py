@@ -16,7 +16,7 @@ import numpy as np
 
 from bemt.base.action import Told
 from bemt.base.document import rows_of
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.page import FIRST
 from bemt.base.tables import json_text, write_atomic
 from bemt.base.units import INCH
@@ -25,16 +25,18 @@ from bemt.data.recordings.channels import named
 from bemt.data.recordings.check import OPEN_OR_OUT, check, left_out
 from bemt.data.recordings.load import as_stated, import_file, is_measured, one_as_stated, stated_options
 from bemt.data.recordings.shown import between_setups, options_of
-from bemt.judge.compare import one_run, two_runs
+from bemt.data.recordings.stated import IGNORED, filled
+from bemt.judge.compare import drive_laws, one_run, two_runs
 from bemt.judge.compare.change_document import DIAGNOSED, ComparedRuns, RankedCause, document, next_step, text
 from bemt.judge.compare.matched import stand_run
 from bemt.judge.compare.recordings import RunChange
 from bemt.judge.compare.selection import Invocation, conditions_of, selected, with_air
-from bemt.judge.diagnose.by_laws import changed
-from bemt.judge.diagnose.load import at_once, is_table, load, load_all
+from bemt.judge.diagnose import by_laws
+from bemt.judge.diagnose.load import at_once, is_table, load, load_all, unknown_effects
 from bemt.judge.diagnose.record import from_series
 from bemt.judge.diagnose.suggest import Given
 from bemt.judge.loss import VerdictAnswer
+from bemt.physics import effects
 from bemt.physics.dataset import Dataset, from_pandas
 from bemt.rotors.propeller import Propeller, rotor_of
 from geometry.common import GeometryError
@@ -108,12 +110,14 @@ class Contrast(VerdictAnswer):
 def compare(
     a: Any, b: Any, case: Propeller | Case | str | os.PathLike[str] | None = None, *, diameter_m: float | None = None,
     label: str | None = None, rows_a: Sequence[str] = (), rows_b: Sequence[str] = (), air_a: str | None = None,
-    air_b: str | None = None, progress: Callable[[str], None] | None = None, run: Mapping[str, Any] | None = None,
+    air_b: str | None = None, ruled_out: Sequence[str] = (), changed: Sequence[str] = (),
+    progress: Callable[[str], None] | None = None, run: Mapping[str, Any] | None = None,
 ) -> Contrast:  # fmt: skip
     """Say what changed between two recordings of one stand: paths, Datasets or DataFrames.
 
     ``label``, such as ``"10x5"``, gives the diameter. ``air_a`` and ``air_b`` say what the files do not:
-    ``"22C,1013hPa"``, ``"22C"``, ``"1.19kg/m3"``, ``"18m/s"``.
+    ``"22C,1013hPa"``, ``"22C"``, ``"1.19kg/m3"``, ``"18m/s"``. Effects are ``ruled_out`` by a check, or were
+    ``changed``.
 
     Notes
     -----
@@ -125,19 +129,24 @@ def compare(
     rotor = None if case is None else rotor_of(case).case
     named = None if rotor is None else os.fspath(case) if isinstance(case, str | os.PathLike) else rotor.path.as_posix()
     asked = Invocation(names[0], names[1], tuple(rows_a), tuple(rows_b), air_a, air_b, label, named, diameter_m,
-                       stated_options(run or {}))  # fmt: skip
+                       stated_options(run or {}), tuple(ruled_out), tuple(changed))  # fmt: skip
+    _known(asked)
     if (a is b or Path(names[0]).resolve() == Path(names[1]).resolve()) and sorted(rows_a) == sorted(rows_b):
         expected = "two recordings, or two choices of rows"
         raise InputError(Fault(names[0], "", "the same recording twice", expected, _two_choices(names[0])))
     read: list[Dataset] = at_once(partial(_read, a, names[0], rows_a, air_a, "--air-a", run or {}),
                                   partial(_read, b, names[1], rows_b, air_b, "--air-b", run or {}))  # fmt: skip
+    if all(f"rpm: {IGNORED} rpm" in imported.notes for imported in read):
+        raise InputError(
+            Fault("--rpm", "", "two files with a speed of their own", "a file without one", "Leave it out")
+        )
     D = rotor.diameter_m if rotor is not None and D is None else D
     rho = None if rotor is None else float(rotor.air().rho)
     findings = [_findings(imported, D, rotor is not None and rotor.ducted, rho) for imported in read]
     read = [_sound(imported, found) for imported, found in zip(read, findings, strict=True)]
     told = [f"{name} ({', '.join(rows)})" if rows else name for name, rows in zip(names, (rows_a, rows_b), strict=True)]
     one, two = at_once(*(partial(stand_run, imported, name, D) for imported, name in zip(read, told, strict=True)))
-    found = changed(one, two, math.nan if D is None else D)
+    found = by_laws.changed(one, two, math.nan if D is None else D, ruled_out, changed)
     said = document(found)
     if rotor is not None and not (found.wind or found.without_speed):
         said = _diagnosed(said, asked, read, rotor, found, progress)
@@ -147,11 +156,23 @@ def compare(
     ))  # fmt: skip
 
 
+def _known(asked: Invocation) -> None:
+    """Refuse effects that nobody knows, and a change that shows in no ratio."""
+    drives = [*dict.fromkeys([*effects.catalogue(), *drive_laws.NAMES])]
+    faults = [*unknown_effects({"--ruled-out": asked.ruled_out, "--changed": asked.changed}, drives)]
+    shown = {*by_laws.law_effects(), *drive_laws.NAMES}
+    for name in () if asked.case or faults else asked.changed:
+        if name not in shown:
+            hint = f"With a case of the rotor the solver weighs it: {asked.command(case='CASE')}"
+            faults.append(Fault("--changed", name, "an effect that ratios alone do not show", "--case CASE", hint))
+    refuse(faults)
+
+
 def _read(given: Any, name: str, rows: Sequence[str], air: str | None, option: str, run: Mapping[str, Any]) -> Dataset:
     """A recording as the user states it."""
     if is_table(given):
         told = as_stated([given], {k: v for k, v in run.items() if k != "rpm"})[0]
-        made = from_pandas(told, name=name) if hasattr(told, "columns") else cast(Dataset, told)
+        made = filled(from_pandas(told, name=name) if hasattr(told, "columns") else cast(Dataset, told), run.get("rpm"))
     else:
         made = one_as_stated(name, run)
     return with_air(selected(made, list(rows), name), air, option)
@@ -167,12 +188,15 @@ def _next(said: ComparedRuns, change: RunChange, asked: Invocation) -> Mapping[s
 def compared(
     a: Any, b: Any, case: Any, *, label: str | None, diameter_m: float | None, rows_a: Sequence[str],
     rows_b: Sequence[str], air_a: str | None, air_b: str | None, out: str | None, figures: bool,
-    progress: Callable[[str], None] | None, run: Mapping[str, Any] | None = None,
+    progress: Callable[[str], None] | None, run: Mapping[str, Any] | None = None, ruled_out: Sequence[str] = (),
+    changed: Sequence[str] = (),
 ) -> Contrast | Told:  # fmt: skip
     """One CFD run beside a case, two grids of a run, two CFD runs, or two recordings; written if a folder is given."""
     found: Contrast | Told
     tables = is_table(a) or is_table(b)
+    of_two = {"--air-a": air_a, "--air-b": air_b, "--ruled-out": ruled_out, "--changed": changed}
     if b is None:
+        refuse(_unused({"--rows-a": rows_a, "--rows-b": rows_b, **of_two}, "one file, beside a case"))
         if case is None:
             inside = between_setups(one_as_stated(a, run or {}), a) if is_measured(a) else []
             pair = " ".join(["bemt compare", *inside, *options_of(stated_options(run or {}))])
@@ -182,14 +206,20 @@ def compared(
         one = one_run.compare_run(as_stated([a], run or {})[0], case, progress, file=typed)
         found = Told(one.document(), one_run.text(one), one_run.text(one, details=True))
     elif not tables and (runs := two_runs.compare_runs(a, b, rows_a, rows_b, run or {})) is not None:
+        refuse(_unused(of_two, "two runs of CFD, of which no cause is named"))
         found = Told(runs.document(), runs.text)
     else:
         found = compare(a, b, case, label=label, diameter_m=diameter_m, rows_a=rows_a, rows_b=rows_b, air_a=air_a,
-                        air_b=air_b, progress=progress, run=run)  # fmt: skip
+                        air_b=air_b, ruled_out=ruled_out, changed=changed, progress=progress, run=run)  # fmt: skip
     if out is not None:
         beside = case if figures and not (rows_a or rows_b or air_a or air_b) else None
         _write(Path(out), found, figures, [name for name in (a, b) if name is not None], beside)
     return found
+
+
+def _unused(given: Mapping[str, Any], here: str) -> list[Fault]:
+    """Options that are of no use here."""
+    return [Fault(option, "", here, "two recordings of measurements") for option, value in given.items() if value]
 
 
 def _write(out: Path, found: Contrast | Told, figures: bool, files: Sequence[str], case: Any) -> None:
@@ -311,8 +341,8 @@ def _given(asked: Invocation) -> Given:
         def command(self, run: str = "", reference: str = "", ruled_out: str = "") -> str:
             if not asked.chosen:
                 return super().command(run, reference, ruled_out)
-            # a comparison of chosen rows has no way to rule out: it is asked again as it was
-            return asked.command(a=reference) if reference else asked.command(b=run or asked.b)
+            again = asked.without(ruled_out) if ruled_out else asked.command(b=run or asked.b)
+            return asked.command(a=reference) if reference else again
 
         def comparison(self, reference: str) -> str:
             return asked.command(a=reference, case=None)
@@ -321,7 +351,8 @@ def _given(asked: Invocation) -> Given:
             return (asked.with_days(),)
 
     case = f"--case {shlex.quote(asked.case or 'CASE')}"
-    return _Pair((shlex.quote(asked.b),), (shlex.quote(asked.a),), case, stated=asked.stated)
+    return _Pair((shlex.quote(asked.b),), (shlex.quote(asked.a),), case, ruled_out=asked.ruled_out,
+                 changed=asked.changed, stated=asked.stated)  # fmt: skip
 
 
 def label_diameter(label: str | None) -> float | None:

@@ -20,7 +20,7 @@ from bemt.judge.compare.matched import StandRun, stand_run
 from bemt.judge.compare.recordings import RunChange, changed
 from bemt.judge.diagnose import along_blade, other_rotor, record
 from bemt.judge.diagnose.record import merged
-from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation, KindPrior
+from bemt.judge.explanation import CHANGED, DOUBT, NONE, UNKNOWN, Explanation, KindPrior
 from bemt.physics import effects
 from bemt.physics.dataset import Dataset
 from bemt.physics.effects.air_density import AirDensity
@@ -51,8 +51,6 @@ EVIDENT = 0.2
 """Weight of what anybody at the stand would see: a second rotor is seldom overlooked [1]."""
 RECORDED = 0.3
 """Weight of a wrong density where thermometer and barometer stand in every file: declared [1]."""
-CHANGED = 50.0
-"""Weight of what the user says he changed: said, weighed, checked [1]."""
 
 
 def prior_weights(problem: Problem, ids: Sequence[str]) -> dict[str, float]:
@@ -257,11 +255,13 @@ def _by_level(P: Mapping[Explanation, float], level: Mapping[str, float]) -> dic
 
 
 def change_of(
-    records: Sequence[Record], diameter_m: float, absent: Collection[str], judge: Callable[[RunChange], Judgement]
+    records: Sequence[Record], diameter_m: float, absent: Collection[str], judge: Callable[[RunChange], Judgement],
+    gone: Collection[str] = (), told: Collection[str] = (),
 ) -> RunChange | None:  # fmt: skip
     """Change of the one recording from its references; None where ratios are no measure of it.
 
-    ``absent``: effects that cannot show; ``judge`` of the loads.
+    ``absent``: effects that cannot show; ``judge`` of the loads; the user has ruled out what is ``gone`` and changed
+    what he has ``told``.
     """
     known, tested = [[r for r in records if r.reference is which] for which in (True, False)]
     # where the speed changes within a second the rows are no steady points
@@ -274,7 +274,7 @@ def change_of(
     alike = all(r.whole is not None for r in pair)
     try:
         runs = [_run(r, diameter_m, r.whole if alike else None) for r in pair]
-        return changed(runs[0], runs[1], diameter_m, judge)
+        return changed(runs[0], runs[1], diameter_m, judge, gone, told)
     except InputError:
         return None
 

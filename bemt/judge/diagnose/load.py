@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -213,16 +213,16 @@ def _points(imported: Dataset, rows: Dataset, path: str) -> Dataset:
 
 def load_all(
     recordings: Sequence[Any], cases: Sequence[Any], references: Sequence[Any] = (), off: Sequence[str] = (),
-    only: Sequence[str] = (), before: Callable[[Sequence[Case]], None] | None = None,
+    said: Mapping[str, Sequence[str]] | None = None, before: Callable[[Sequence[Case]], None] | None = None,
     rpm: Sequence[float] = (), airspeed_m_s: Sequence[float] = (), density_kg_m3: Sequence[float] = (),
-    ruled_out: Sequence[str] = (), reference_case: Case | None = None,
+    reference_case: Case | None = None,
 ) -> tuple[list[Case], list[Record]]:  # fmt: skip
     """Cases of the recordings, and recordings with the references last; each a path, a Dataset or a DataFrame.
 
     ``before`` may refuse the cases before any recording is read. References have the case of the recordings unless
-    they have one of their own.
+    they have one of their own. Effects are ``said`` by option.
     """
-    _told_twice([*recordings, *references], only, ruled_out)
+    refuse([*_told_twice([*recordings, *references]), *unknown_effects(said or {})])
     found = at_once(
         lambda: cases_of(cases, off, len(recordings)), *(partial(_there, p) for p in (*recordings, *references))
     )[0]
@@ -320,24 +320,26 @@ def _each(option: str, given: Sequence[float], recordings: int, n: int) -> list[
     return [*map(float, given), *[None] * (n - len(given))]
 
 
-def _told_twice(given: Sequence[Any], only: Sequence[str], ruled_out: Sequence[str]) -> None:
-    """Refuse recordings that count twice and effects that nobody knows."""
+def _told_twice(given: Sequence[Any]) -> Iterator[Fault]:
+    """Recordings that count twice."""
     paths = [p for p in given if isinstance(p, str)]
     files = [Path(p).resolve() for p in paths]
-    faults = [Fault(p, "", "a recording given twice", "each once", "Its points would count twice")
-              for k, p in enumerate(paths) if files[k] in files[:k]]  # fmt: skip
-    faults += [*_unknown(only), *_unknown(ruled_out, "--ruled-out")]
-    refuse(faults)
+    for k, p in enumerate(paths):
+        if files[k] in files[:k]:
+            yield Fault(p, "", "a recording given twice", "each once", "Its points would count twice")
 
 
-def _unknown(only: Sequence[str], option: str = "--only") -> list[Fault]:
-    known, faults = effects.catalogue(), []
-    for name in only:
-        if name not in known:
-            near = difflib.get_close_matches(name, known, 1)
-            hint = f"Did you mean {near[0]}?" if near else ""
-            faults.append(Fault(option, name, "an unknown effect", f"one of {', '.join(known)}", hint))
-    return faults
+def unknown_effects(said: Mapping[str, Sequence[str]], known: Collection[str] = ()) -> Iterator[Fault]:
+    """Effects, by option, that nobody knows, and what was changed and is ruled out; ``known``: all by default."""
+    known = known or effects.catalogue()
+    for option, names in said.items():
+        for name in names:
+            if name not in known:
+                near = difflib.get_close_matches(name, known, 1)
+                hint = f"Did you mean {near[0]}?" if near else ""
+                yield Fault(option, name, "an unknown effect", f"one of {', '.join(known)}", hint)
+    for name in sorted({*said.get("--changed", ())} & {*said.get("--ruled-out", ())}):
+        yield Fault("--ruled-out", name, "an effect that is changed as well", "one of both")
 
 
 def _one_setup(imported: Dataset, path: str) -> None:

@@ -80,7 +80,8 @@ class Given:
     def command(self, run: str = "", reference: str = "", ruled_out: str = "") -> str:
         """Command that diagnoses the same again, with one more file or one effect less."""
         said = {"--reference": (*self.references, reference), "": (self.case, self.rest, *options_of(self.stated)),
-                "--changed": self.changed, "--ruled-out": (*self.ruled_out, ruled_out)}  # fmt: skip
+                "--changed": tuple(k for k in self.changed if k != ruled_out),
+                "--ruled-out": (*self.ruled_out, ruled_out)}  # fmt: skip
         words = (word for option, own in said.items() if any(own) for word in (option, *own))
         return " ".join(filter(None, ["bemt diagnose", *self.recordings, run, *words]))
 

@@ -195,7 +195,6 @@ def design(
 
     The page on design (docs/design.md) has one that is designed.
     """
-    from numbers import Real
     from pathlib import Path as File
 
     from bemt.base.errors import Fault, refuse
@@ -206,11 +205,7 @@ def design(
     from bemt.tools.design.blade_design import design_blade
     from bemt.tools.design.requirement import DesignPoint, point_of
 
-    given: dict[str, Any] = {"thrust_N": thrust_N, "diameter_in": diameter_in, "airspeed_m_s": airspeed_m_s, "rpm": rpm,
-             "hub_ratio": hub_ratio, "static_thrust_N": static_thrust_N, "static_rpm": static_rpm,
-             "min_chord_mm": min_chord_mm, "min_thickness_mm": min_thickness_mm, "max_tip_mach": max_tip_mach,
-             "stall_margin": stall_margin, "safety": safety, "density_kg_m3": density_kg_m3}  # fmt: skip
-    faults = [Fault("", k, repr(v), "a number") for k, v in given.items() if not isinstance(v, (Real, type(None)))]
+    faults = []
     if thrust_N is None and (rpm is not None or airspeed_m_s):
         faults.append(Fault("", "--thrust-N", "nothing", "a thrust [N] with --airspeed-m-s and --rpm"))
     asked = [] if thrust_N is None else [DesignPoint(thrust_N, airspeed_m_s, rpm)]
@@ -218,7 +213,7 @@ def design(
     for i, point in enumerate(each):
         if isinstance(point, str):
             asked.append(point_of(point))
-        elif len(tuple(point)) != 4:
+        elif not isinstance(point, (tuple, list)) or len(point) != 4:
             expected = "(thrust_N, airspeed_m_s, rpm or None, weight)"
             faults.append(Fault("", f"points[{i}]", repr(point), expected))
         else:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, refuse
+from bemt.base.given import path_text
 from bemt.data.readers import load_text
 from bemt.data.readers.split import decimal_mark, split_table
 from bemt.rotors.case.motor import NamedMotor, motors_on_sale, named_motor, resistance_of_mass
@@ -131,7 +132,7 @@ def motors_of(given: str | os.PathLike[str] | KnownMotor) -> tuple[KnownMotor, .
     """Motors as told: one, a CSV of them, or the name of one on sale, such as ``T-Motor MN2212 920``."""
     if isinstance(given, KnownMotor):
         return (given,)
-    text = os.fspath(given)
+    text = path_text("motors", given)
     if Path(text).suffix or Path(text).exists() or "/" in text or os.sep in text:
         return read_motors(text)
     return (_known(named_motor(text, "--motors")),)
