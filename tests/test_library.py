@@ -452,6 +452,9 @@ def test_one_thing_is_a_sequence_of_it_and_what_fits_no_parameter_is_refused(tmp
     for point in (KnownMotor, np.float64(5.0), Path("a.csv")):
         with pytest.raises(bemt.InputError, match=r"points\[0\]"):
             bemt.design(points=point)
+    for given in ({"logs": FRAME}, {"logs": None}, {"logs": "a.bin", "healthy": np.array([5.0])}):
+        with pytest.raises(bemt.InputError, match=f"^{[*given][-1]}: got"):
+            bemt.fly(**given)
     (tmp_path / "taken").write_text("")
     with pytest.raises(bemt.InputError, match="taken: got File exists"):
         bemt.choose(8.0, 3, labels="10x4.5", kv=900.0, out=tmp_path / "taken")

@@ -39,9 +39,10 @@ def declared(name: str, kind: str, value: Any) -> Any:
         ...
     bemt.base.errors.InputError: label: got int 5; expected text.
     """
-    one, many, _ = kind.partition("Sequence[")
+    one, many, inner = kind.partition("Sequence[")
     plain = kind.removesuffix(" | None")
-    if value is None and (plain != kind or plain not in (*_PATHS, *_NUMBERS, "str")):
+    paths = one.removesuffix(" | ") in _PATHS or inner.startswith("StrPath")
+    if value is None and (plain != kind or not (paths or plain in (*_PATHS, *_NUMBERS, "str"))):
         return value
     if many:
         value = _several(one, value)
@@ -54,6 +55,9 @@ def declared(name: str, kind: str, value: Any) -> Any:
         value = number(name, value, finite=False)
     elif plain in _PATHS and not isinstance(value, str):
         path_text(name, value)
+    elif many and paths and "KnownMotor" not in inner:
+        for path in (p for v in each for p in (v if isinstance(v, (list, tuple)) else [v])):
+            path_text(name, path)
     elif plain == "str" and not isinstance(value, str):
         expected = "text"
     elif plain in ("Sequence[str]", "str | Sequence[str]") and not words:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Literal
 
 from bemt.base.action import Told, action, worded
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["fetch", "read"]
 
 
-@worded
+@partial(worded, checked=True)
 def read(path: Path, format: str | None = None) -> Dataset:  # noqa: A002
     r"""Read a recording: a bench log, a table, a CFD export, a vendor file.
 

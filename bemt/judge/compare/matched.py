@@ -480,12 +480,18 @@ def in_common(c: MatchedChannel) -> MatchedChannel:
 
 
 def _beyond(c: MatchedChannel, keep: NDArray[np.bool_]) -> Iterator[LeftOut]:
-    """Speeds at which one of two recordings alone was."""
+    """Speeds and advance ratios at which one of two recordings alone was."""
+    if c.name not in (*LOADS, "electrical"):
+        return
+    low, high = c.common()
     for letter, mine in (("A", ~c.second), ("B", c.second)):
-        n = np.exp(c.x[mine & ~keep, 0])
-        if n.size and c.name in (*LOADS, "electrical"):
-            ends = dict.fromkeys(f"{v:.0f}" for v in (n.min(), n.max()))
-            yield LeftOut("beyond", letter, (f"{' to '.join(ends)} rev/min",))
+        x = c.x[mine & ~keep]
+        slow, fast = x[:, 0] < low, x[:, 0] > high
+        for some_, k, unit in ((slow, 0, " rev/min"), (fast, 0, " rev/min"), (~slow & ~fast, 1, " of advance")):
+            if some_.any():
+                v = np.exp(x[some_, k]) if k == 0 else x[some_, k]
+                ends = dict.fromkeys(f"{end:.{0 if k == 0 else 2}f}" for end in (v.min(), v.max()))
+                yield LeftOut("beyond", letter, (f"{' to '.join(ends)}{unit}",))
 
 
 def words_of_left_out(channels: Iterable[MatchedChannel]) -> list[str]:
