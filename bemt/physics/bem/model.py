@@ -46,8 +46,8 @@ HUB_LOADS = ("H_force_N", "Y_force_N", "roll_moment_Nm", "pitch_moment_Nm")
 """Channels of the hub's loads in oblique flow, in the order of :attr:`bemt.physics.bem.solver.Solution.hub`."""
 
 
-MOST_PREPARED = 160e6
-"""Bytes of prepared rotors that a process keeps: the unknowns of three labels [B]."""
+MOST_PREPARED = 130e6
+"""Bytes of prepared rotors that a process keeps: the unknowns of two labels [B]."""
 PREPARED: Kept[solver.Prepared] = Kept(MOST_PREPARED, lambda made: made.st.nbytes + made.tab.nbytes)
 """Prepared rotors of this process, by geometry, section tables, duct, effects and range."""
 
