@@ -196,7 +196,19 @@ class Model:
         ``H_force_N`` downstream, ``Y_force_N`` to the advancing side, ``roll_moment_Nm`` lifting the advancing side,
         ``pitch_moment_Nm`` lifting the upstream side. ``near`` as in :func:`bemt.physics.bem.solver.solve`.
         """
-        air = Air.from_density() if air is None else air
+        values, flags = self.channels(rpm, V, Air.from_density() if air is None else air, threads, side, near)
+        return self.dataset(values, flags)
+
+    def dataset(self, values: Mapping[str, Array], flags: tuple[tuple[str, ...], ...]) -> Dataset:
+        """Channels and flags of points, with what they came from."""
+        provenance = {"source": "bemt", "effects": self._texts, "stations": self.n_stations}
+        name = self.rotor.name or "rotor"
+        return Dataset("bemt", name, values, flags=flags, provenance=provenance, notes=self.notes)
+
+    def channels(
+        self, rpm: ArrayLike, V: ArrayLike, air: Air, threads: int = 1, side: ArrayLike = 0.0, near: Near | None = None
+    ) -> tuple[dict[str, Array], tuple[tuple[str, ...], ...]]:
+        """Channels and flags of :meth:`solve`, for callers that ask for a few numbers many times."""
         s = solver.solve(self.prep, rpm, V, air, threads=threads, side=side, near=near)
         n, D = s.rpm / 60.0, self.diameter_m
         rho, mu, a = (np.broadcast_to(np.asarray(getattr(air, k), float), n.shape) for k in ("rho", "mu", "a_sound"))
@@ -232,9 +244,7 @@ class Model:
         if s.side is not None and s.hub is not None:
             values["sideslip_rad"] = np.arctan2(s.side, s.V)
             values |= {key: s.hub[:, i] for i, key in enumerate(HUB_LOADS)}
-        provenance = {"source": "bemt", "effects": self._texts, "stations": self.n_stations}
-        name = self.rotor.name or "rotor"
-        return Dataset("bemt", name, values, flags=flags, provenance=provenance, notes=self.notes)
+        return values, flags
 
 
 def solve(

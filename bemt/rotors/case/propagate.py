@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from bemt.rotors.case.load import Assumption, Case
 
 Answers = Mapping[str, Array]
+Flags = tuple[tuple[str, ...], ...]
 Progress = Callable[[int, int, str], None]
 
 BANDED = ("thrust_N", "torque_Nm", "power_W", "CT", "CP", "eta", "exhaust_speed_m_s", "duct_share")
@@ -70,12 +71,17 @@ class Points:
         n, V, rho, angle = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, dtype=float)) for v in given))
         return Points(case, n.ravel(), V.ravel(), rho.ravel(), angle.ravel())
 
-    def solve(self, model: Model | PairModel, changed: Case, threads: int, near: Near | None = None) -> Dataset:
-        """A model of a changed case solved at the points, near the ones solved before unless the wind turns."""
+    def solve(self, model: Model | PairModel, changed: Case, threads: int) -> Dataset:
+        """A model of a changed case solved at the points."""
+        return model.dataset(*self.channels(model, changed, threads))
+
+    def channels(
+        self, model: Model | PairModel, changed: Case, threads: int, near: Near | None = None
+    ) -> tuple[Answers, Flags]:
+        """Channels and flags of a changed case, near the ones solved before unless the wind turns."""
         rpm, V, air = at = self.conditions(changed)
-        model = model.at_speeds(*at)
         turned = changed.angle_deg != self.case.angle_deg
-        return solve_at(model, rpm, V, self.angles(changed), air, threads, None if turned else near)
+        return _channels_at(model.at_speeds(*at), rpm, V, self.angles(changed), air, threads, None if turned else near)
 
     def angles(self, changed: Case) -> Array:
         """Angle between wind and shaft at the points in a changed case [deg]."""
@@ -94,26 +100,34 @@ class Points:
 
 
 def solve_at(
-    model: Model | PairModel, rpm: Array, airspeed_m_s: Array, angle_deg: Array, air: Air, threads: int = 1,
-    near: Near | None = None,
-) -> Dataset:  # fmt: skip
+    model: Model | PairModel, rpm: Array, airspeed_m_s: Array, angle_deg: Array, air: Air, threads: int = 1
+) -> Dataset:
     """A model at points (P,) with their angle between wind and shaft [deg].
 
     With any angle, airspeed and J are those given, eta is T V cos(angle) / P, and the loads of the hub are there, 0 in
     axial flow.
     """
+    return model.dataset(*_channels_at(model, rpm, airspeed_m_s, angle_deg, air, threads))
+
+
+def _channels_at(
+    model: Model | PairModel, rpm: Array, airspeed_m_s: Array, angle_deg: Array, air: Air, threads: int,
+    near: Near | None = None,
+) -> tuple[Answers, Flags]:  # fmt: skip
+    """Channels and flags of `solve_at`; ``near`` as in :func:`bemt.physics.bem.solver.solve`."""
     if not np.any(angle_deg):
-        return model.solve(rpm, airspeed_m_s, air, threads)
+        return model.channels(rpm, airspeed_m_s, air, threads)
     along, side = parted(airspeed_m_s, angle_deg)
     if isinstance(model, PairModel):
-        found = model.solve(rpm, along, air, threads, side)
+        found, flags = model.channels(rpm, along, air, threads, side)
     else:
-        found = model.solve(rpm, along, air, threads, side, near)
-    J = np.asarray(co.J(airspeed_m_s, found.rpm / 60.0, model.diameter_m))
-    none = dict.fromkeys(HUB_LOADS, np.where(found.converged, 0.0, np.nan))
-    own = {"airspeed_m_s": airspeed_m_s, "J": J, "eta": co.eta(along / (found.rpm / 60.0) / model.diameter_m,
-           found.CT, found.CP), "sideslip_rad": np.arctan2(side, along)}  # fmt: skip
-    return replace(found, values={**none, **found.values, **own})
+        found, flags = model.channels(rpm, along, air, threads, side, near)
+    n = found["rpm"] / 60.0
+    eta = co.eta(along / n / model.diameter_m, found["CT"], found["CP"])
+    none = dict.fromkeys(HUB_LOADS, np.where(np.isfinite(found["CT"]) & np.isfinite(found["CP"]), 0.0, np.nan))
+    own = {"airspeed_m_s": airspeed_m_s, "J": np.asarray(co.J(airspeed_m_s, n, model.diameter_m)), "eta": eta,
+           "sideslip_rad": np.arctan2(side, along)}  # fmt: skip
+    return {**none, **found, **own}, flags
 
 
 def parted(airspeed_m_s: Array, angle_deg: Array) -> tuple[Array, Array]:
@@ -289,16 +303,16 @@ def propagate(
         near = oblique_near.Near()
     steps, done = 2 + sum(len(item.values) for item in (*declared, *of_second)), 0
 
-    def solved(changed: Case, what: str, second: Case | None = None) -> tuple[Model | PairModel, Dataset]:
+    def solved(changed: Case, what: str, second: Case | None = None) -> tuple[Model | PairModel, Answers, Flags]:
         nonlocal done
         model = prepared(changed, None, second).at_speeds(*points.conditions(changed))
-        found = points.solve(model, changed, threads, near)
+        found, flags = points.channels(model, changed, threads, near)
         done += 1
         if progress is not None:
             progress(done, steps, what)
-        return model, found
+        return model, found, flags
 
-    def channels(found: Dataset) -> dict[str, Array]:
+    def channels(found: Answers | Dataset) -> dict[str, Array]:
         keys = (*BANDED, *LOADS, *RATIOS) if case.paired else BANDED
         return {key: np.asarray(found[key], dtype=float) for key in keys}
 
@@ -307,7 +321,8 @@ def propagate(
         rpm, V, air = points.conditions(case)
         return model.solve(rpm, parted(V, points.angle_deg)[0], air, threads)
 
-    model, found = solved(case, "nominal")
+    model, values, told = solved(case, "nominal")
+    found = model.dataset(values, told)
     beside = along(model) if np.any(skewed) else found
     if isinstance(model, PairModel):
         from bemt.rotors.case.pair_error import PairError
