@@ -38,7 +38,7 @@ from bemt.physics import coefficients as co
 from bemt.physics.air import Air
 from bemt.physics.bem import kernel as K
 from bemt.physics.bem import solver
-from bemt.physics.bem.model import Model
+from bemt.physics.bem.model import Flags, Model
 from bemt.physics.dataset import Dataset
 from bemt.physics.effects import to_text
 from bemt.physics.wake import WAKE_RADIUS, ahead, contracted, hover_gain, streamtubes
@@ -361,16 +361,16 @@ class PairModel:
         """
         return self.dataset(*self.channels(rpm, V, Air.from_density() if air is None else air, threads, side))
 
-    def dataset(self, values: Mapping[str, Array], flags: tuple[tuple[str, ...], ...]) -> Dataset:
-        """Channels and flags of points, with what they came from."""
+    def dataset(self, values: Mapping[str, Array], flags: Flags) -> Dataset:
+        """Channels and flags with what they came from."""
         provenance = {"source": "bemt", "effects": tuple(to_text(e) for e in self.effects),
                       "stations": self.upper.n_stations}  # fmt: skip
         return Dataset("bemt", self.upper.rotor.name or "pair", values, flags=flags, provenance=provenance,
                        notes=self.notes, units={"lower_rpm": "rpm"})  # fmt: skip
 
     def channels(
-        self, rpm: ArrayLike, V: ArrayLike, air: Air, threads: int = 1, side: ArrayLike = 0.0
-    ) -> tuple[dict[str, Array], tuple[tuple[str, ...], ...]]:
+        self, rpm: ArrayLike, V: ArrayLike, air: Air, threads: int, side: ArrayLike = 0.0
+    ) -> tuple[dict[str, Array], Flags]:
         """Channels and flags of :meth:`solve`."""
         if np.any(np.asarray(side) != 0.0):
             raise ValueError("side: got in-plane wind on a coaxial pair; expected axial flow")
@@ -393,7 +393,7 @@ class PairModel:
 
     def _channels(
         self, found: PairSolution, n: Array, V: Array, rho: Array, a: Array, mu: Array
-    ) -> tuple[dict[str, Array], tuple[tuple[str, ...], ...]]:
+    ) -> tuple[dict[str, Array], Flags]:
         """Channels and flags of solved points."""
         nan = np.where(found.converged, 1.0, np.nan)
         parts, m = (found.upper, found.lower), found.lower.rpm * nan
