@@ -20,7 +20,7 @@ from bemt.__main__ import main
 from bemt.base.errors import InputError
 from bemt.rotors.case import load_case
 from bemt.rotors.case.prepare import prepare_case
-from bemt.rotors.case.propagate import propagate, solve_at
+from bemt.rotors.case.propagate import channels_at, propagate
 from bemt.rotors.conditioning import ReferenceRun, condition, noise_of_run, scatter
 from bemt.rotors.latents import NAMES, Prior, Sensed
 from bemt.rotors.model import RealRotor, coefficients
@@ -500,8 +500,8 @@ def test_a_calibrated_rotor_is_solved_with_all_that_its_run_tells(
     np.testing.assert_allclose(known.thrust_N, thrust, rtol=0.025)
     np.testing.assert_array_equal(known.thrust_N, banded.thrust_N)
     np.testing.assert_allclose(known.power_W, known.torque_Nm * rpm * np.pi / 30.0, rtol=1e-12)
-    grid = solve_at(prepare_case(case), rpm, V, np.zeros(8), case.air())
-    np.testing.assert_allclose(grid.thrust_N, known.thrust_N, rtol=1e-9)
+    grid, _ = channels_at(prepare_case(case), rpm, V, np.zeros(8), case.air())
+    np.testing.assert_allclose(grid["thrust_N"], known.thrust_N, rtol=1e-9)
 
 
 def test_calibrate_rotor_refuses_a_run_of_another_rotor_or_unit(

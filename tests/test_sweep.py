@@ -417,18 +417,14 @@ def test_strict_turns_a_large_error_into_1(tmp_path: Path, capsys: pytest.Captur
 
 
 def test_unconverged_points_are_counted_and_never_zero(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import dataclasses
-
-    solved = Model.solve
+    solved = Model.channels
 
     def failing(*args: Any, **kwargs: Any) -> Any:
-        points = solved(*args, **kwargs)
-        lost = dict.fromkeys(("thrust_N", "torque_Nm", "power_W", "CT", "CP"), np.full(len(points), np.nan))
-        return dataclasses.replace(
-            points, values={**points.values, **lost}, flags=(("not converged: planted",),) * len(points)
-        )
+        values, flags = solved(*args, **kwargs)
+        lost = dict.fromkeys(("thrust_N", "torque_Nm", "power_W", "CT", "CP"), np.full(len(flags), np.nan))
+        return {**values, **lost}, (("not converged: planted",),) * len(flags)
 
-    monkeypatch.setattr(Model, "solve", failing)
+    monkeypatch.setattr(Model, "channels", failing)
     path = make_case(tmp_path, extra="[sweep]\nrpm = [3000, 6000]\n")
     result = json.loads(json_text(sweep([path], tmp_path / "out")))["cases"][0]
     bemt = row_of(result, "bemt")

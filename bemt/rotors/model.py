@@ -50,8 +50,8 @@ def coefficients(model: Model, air: Air) -> Solve:
 
     def solve(z: Array, rpm: Array, J: Array, which: NDArray[np.intp]) -> Array:
         at = air_of_points({k: v[which] if v.size > 1 else v for k, v in states.items()})
-        found = built(z.tobytes()).solve(rpm, J * rpm / 60.0 * model.diameter_m, at)
-        return np.array([found.CT, found.CP])
+        found, _ = built(z.tobytes()).channels(rpm, J * rpm / 60.0 * model.diameter_m, at, 1)
+        return np.array([found["CT"], found["CP"]])
 
     return solve
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import subprocess
 import sys
 import tempfile
@@ -15,12 +16,14 @@ from typing import Any
 
 LINES = {
     "one_point_ms": ("one point with bands, warm process", "ms"),
+    "new_speed_ms": ("another speed with bands, warm process", "ms"),
     "many_points_s": ("10,000 points with bands, warm process", "s"),
     "sweep_first_s": ("sweep cases/ in process, first time", "s"),
     "sweep_s": ("sweep cases/ in process, again", "s"),
     "first_answer_s": ("first answer from nothing, whole process", "s"),
+    "labels_MB": ("most memory of a process that asks for 21 labels", "MB"),
 }
-"""Keys of the document: words and unit. All are CPU time, user and system."""
+"""Keys of the document: words and unit. Times are CPU time, user and system."""
 
 _WARM = """
 import json, sys, time
@@ -40,6 +43,8 @@ repeats, cases = int(sys.argv[1]), sys.argv[2]
 rotor = bemt.propeller("10x5")
 rpm, V = np.linspace(2000.0, 9000.0, 10000), np.linspace(0.0, 20.0, 10000)
 out = {"one_point_ms": 1e3 * best(lambda: rotor.solve(6000), 5 * repeats)}
+speeds = iter(np.linspace(3100.0, 8900.0, 5 * repeats + 1))
+out["new_speed_ms"] = 1e3 * best(lambda: rotor.solve(next(speeds)), 5 * repeats)
 out["many_points_s"] = best(lambda: rotor.solve(rpm, V), repeats)
 if cases:
     from bemt.rotors.case import find_cases, load_case
@@ -59,10 +64,11 @@ if cases:
 print(json.dumps(out))
 """
 _FIRST = 'import bemt; print(bemt.propeller("10x5").solve(6000).thrust_N)'
+_LABELS = 'import bemt; [bemt.propeller(f"{D}x{D / 2:g}").solve(6000) for D in range(5, 26)]'
 
 
-def _run(words: list[str], tree: Path, **more: str) -> tuple[str, float]:
-    """Output and CPU seconds of a Python process that imports from a checkout."""
+def _run(words: list[str], tree: Path, **more: str) -> tuple[str, resource.struct_rusage]:
+    """Output and use of the machine of a Python process that imports from a checkout."""
     env = os.environ | {"PYTHONPATH": str(tree), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"} | more
     with tempfile.TemporaryFile() as out:
         process = subprocess.Popen([sys.executable, *words], cwd=tree, env=env, stdout=out)
@@ -72,7 +78,7 @@ def _run(words: list[str], tree: Path, **more: str) -> tuple[str, float]:
         text = out.read().decode()
     if process.returncode:
         raise RuntimeError(f"python {words[0]} in {tree} ended with {process.returncode}")
-    return text, used.ru_utime + used.ru_stime
+    return text, used
 
 
 def measure(tree: Path, quick: bool = False) -> dict[str, float]:
@@ -82,7 +88,9 @@ def measure(tree: Path, quick: bool = False) -> dict[str, float]:
     found: dict[str, float] = json.loads(text.splitlines()[-1])
     with tempfile.TemporaryDirectory() as empty:
         caches = {"BEMT_CACHE": f"{empty}/bemt", "NUMBA_CACHE_DIR": f"{empty}/numba", "BEMT_COMPILE": ""}
-        found["first_answer_s"] = _run(["-c", _FIRST], tree, **caches)[1]
+        used = _run(["-c", _FIRST], tree, **caches)[1]
+    found["first_answer_s"] = used.ru_utime + used.ru_stime
+    found["labels_MB"] = 1.024e-3 * _run(["-c", _LABELS], tree)[1].ru_maxrss
     return found
 
 

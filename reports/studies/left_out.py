@@ -206,7 +206,7 @@ def table(document: dict[str, Any]) -> str:
         for kind in KINDS:
             for q in ("CT", "CP"):
                 s = total[kind][q]
-                if s["median_abs"] is None:
+                if s["median_abs"] is None or math.isnan(s["median_abs"]):
                     continue
                 held = s.get("coverage", {"68": None, "95": None})
                 cells = [s["median_abs"], s["p90_abs"], held["68"], held["95"], s.get("width68")]

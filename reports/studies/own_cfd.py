@@ -19,8 +19,8 @@ from bemt.base.tables import json_text, number_text, text_table
 from bemt.physics.bem import solver
 from bemt.physics.bem.model import Model
 from bemt.rotors.case import Case
+from bemt.rotors.case.oblique import parted
 from bemt.rotors.case.prepare import prepare_case
-from bemt.rotors.case.propagate import parted
 from bemt.tools.cfd.record import csv_rows, studies_of
 from bemt.tools.cfd.schema import Campaign, RunRow, Study, load_campaign, run_of
 

@@ -24,6 +24,7 @@ induce, so that equal thrusts cost sqrt(2) times the ideal power of two rotors a
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import SimpleNamespace
@@ -37,7 +38,7 @@ from bemt.physics import coefficients as co
 from bemt.physics.air import Air
 from bemt.physics.bem import kernel as K
 from bemt.physics.bem import solver
-from bemt.physics.bem.model import Model
+from bemt.physics.bem.model import Flags, Model
 from bemt.physics.dataset import Dataset
 from bemt.physics.effects import to_text
 from bemt.physics.wake import WAKE_RADIUS, ahead, contracted, hover_gain, streamtubes
@@ -358,9 +359,21 @@ class PairModel:
         Coefficients refer to diameter and speed of the upper rotor. ``reaction_torque_Nm`` is what the vehicle gets
         about the axis, the upper rotor's counted positive. Raises ValueError for a wind that is not along the shaft.
         """
+        return self.dataset(*self.channels(rpm, V, Air.from_density() if air is None else air, threads, side))
+
+    def dataset(self, values: Mapping[str, Array], flags: Flags) -> Dataset:
+        """Channels and flags with what they came from."""
+        provenance = {"source": "bemt", "effects": tuple(to_text(e) for e in self.effects),
+                      "stations": self.upper.n_stations}  # fmt: skip
+        return Dataset("bemt", self.upper.rotor.name or "pair", values, flags=flags, provenance=provenance,
+                       notes=self.notes, units={"lower_rpm": "rpm"})  # fmt: skip
+
+    def channels(
+        self, rpm: ArrayLike, V: ArrayLike, air: Air, threads: int, side: ArrayLike = 0.0
+    ) -> tuple[dict[str, Array], Flags]:
+        """Channels and flags of :meth:`solve`."""
         if np.any(np.asarray(side) != 0.0):
             raise ValueError("side: got in-plane wind on a coaxial pair; expected axial flow")
-        air = Air.from_density() if air is None else air
         fields = np.broadcast_arrays(*(np.asarray(v, float) for v in (rpm, V, air.rho, air.mu, air.a_sound)))
         n, speed, rho, mu, a = (np.atleast_1d(v).ravel().astype(float) for v in fields)
         lower = None if self.torque_balance else n * self.rpm_ratio
@@ -376,15 +389,11 @@ class PairModel:
             found = solve(pair, n[at], None if lower is None else lower[at], speed[at], rho[at], mu[at], a[at])
             parts.append(self._channels(found, n[at], speed[at], rho[at], a[at], mu[at]))
         values = {key: np.concatenate([one[key] for one, _ in parts]) for key in parts[0][0]}
-        flags = tuple(words for _, some in parts for words in some)
-        provenance = {"source": "bemt", "effects": tuple(to_text(e) for e in self.effects),
-                      "stations": self.upper.n_stations}  # fmt: skip
-        return Dataset("bemt", self.upper.rotor.name or "pair", values, flags=flags, provenance=provenance,
-                       notes=self.notes, units={"lower_rpm": "rpm"})  # fmt: skip
+        return values, tuple(words for _, some in parts for words in some)
 
     def _channels(
         self, found: PairSolution, n: Array, V: Array, rho: Array, a: Array, mu: Array
-    ) -> tuple[dict[str, Array], tuple[tuple[str, ...], ...]]:
+    ) -> tuple[dict[str, Array], Flags]:
         """Channels and flags of solved points."""
         nan = np.where(found.converged, 1.0, np.nan)
         parts, m = (found.upper, found.lower), found.lower.rpm * nan

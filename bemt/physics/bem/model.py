@@ -42,12 +42,13 @@ _SLOWEST, _FASTEST = 0.4, 1.5
 # More points than these are not looked at one by one.
 _MANY = 64
 
+Flags = tuple[tuple[str, ...], ...]  # Words of each point
 HUB_LOADS = ("H_force_N", "Y_force_N", "roll_moment_Nm", "pitch_moment_Nm")
 """Channels of the hub's loads in oblique flow, in the order of :attr:`bemt.physics.bem.solver.Solution.hub`."""
 
 
-MOST_PREPARED = 160e6
-"""Bytes of prepared rotors that a process keeps: the unknowns of three labels [B]."""
+MOST_PREPARED = 130e6
+"""Bytes of prepared rotors that a process keeps: the unknowns of two labels [B]."""
 PREPARED: Kept[solver.Prepared] = Kept(MOST_PREPARED, lambda made: made.st.nbytes + made.tab.nbytes)
 """Prepared rotors of this process, by geometry, section tables, duct, effects and range."""
 
@@ -186,17 +187,27 @@ class Model:
         return np.asarray(thrust), np.asarray(power) / (2.0 * np.pi * n)
 
     def solve(
-        self, rpm: ArrayLike, V: ArrayLike = 0.0, air: Air | None = None, threads: int = 1, side: ArrayLike = 0.0,
-        near: Near | None = None,
-    ) -> Dataset:  # fmt: skip
+        self, rpm: ArrayLike, V: ArrayLike = 0.0, air: Air | None = None, threads: int = 1, side: ArrayLike = 0.0
+    ) -> Dataset:
         """Solve operating points; ``V`` [m/s] along the shaft, ``side`` [m/s] in the plane of the disk.
 
         With any ``side``, the airspeed of the result (and J) is that of the wind and ``sideslip_rad`` its angle to the
         shaft; ``eta`` is T V cos(angle) / P, with the speed along the shaft. The loads of the hub are added:
         ``H_force_N`` downstream, ``Y_force_N`` to the advancing side, ``roll_moment_Nm`` lifting the advancing side,
-        ``pitch_moment_Nm`` lifting the upstream side. ``near`` as in :func:`bemt.physics.bem.solver.solve`.
+        ``pitch_moment_Nm`` lifting the upstream side.
         """
-        air = Air.from_density() if air is None else air
+        return self.dataset(*self.channels(rpm, V, Air.from_density() if air is None else air, threads, side))
+
+    def dataset(self, values: Mapping[str, Array], flags: Flags) -> Dataset:
+        """Channels and flags with what they came from."""
+        provenance = {"source": "bemt", "effects": self._texts, "stations": self.n_stations}
+        name = self.rotor.name or "rotor"
+        return Dataset("bemt", name, values, flags=flags, provenance=provenance, notes=self.notes)
+
+    def channels(
+        self, rpm: ArrayLike, V: ArrayLike, air: Air, threads: int, side: ArrayLike = 0.0, near: Near | None = None
+    ) -> tuple[dict[str, Array], Flags]:
+        """Channels and flags of :meth:`solve`; ``near`` as in :func:`bemt.physics.bem.solver.solve`."""
         s = solver.solve(self.prep, rpm, V, air, threads=threads, side=side, near=near)
         n, D = s.rpm / 60.0, self.diameter_m
         rho, mu, a = (np.broadcast_to(np.asarray(getattr(air, k), float), n.shape) for k in ("rho", "mu", "a_sound"))
@@ -232,9 +243,7 @@ class Model:
         if s.side is not None and s.hub is not None:
             values["sideslip_rad"] = np.arctan2(s.side, s.V)
             values |= {key: s.hub[:, i] for i, key in enumerate(HUB_LOADS)}
-        provenance = {"source": "bemt", "effects": self._texts, "stations": self.n_stations}
-        name = self.rotor.name or "rotor"
-        return Dataset("bemt", name, values, flags=flags, provenance=provenance, notes=self.notes)
+        return values, flags
 
 
 def solve(

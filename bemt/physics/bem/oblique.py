@@ -114,8 +114,8 @@ def _blade(lookup, W, s, c, UT, UP, Vy, grad, flap, beta, cs, sn, lre, base, tab
 
 
 @inlined
-def _annulus(lookup, phi, UT, UP, Vy, x, flap, beta, sg4, tip, hub, lre, base, tab, g, fx, cs, sn, n):
-    """Residual [m/s] and the state of one annulus, loads averaged over n azimuths; last their sums [m2/s2]."""
+def _mean(lookup, phi, UT, UP, Vy, x, beta, sg4, tip, hub, lre, base, tab, g, fx):
+    """Mean flow of one annulus: drag term, W, F M, W0, sine and cosine, gradient, F, whether the curve of descent."""
     s, c = sincos(phi)
     swirl = fx[N_SWIRL]
     W0 = UT * c + UP * s
@@ -155,17 +155,27 @@ def _annulus(lookup, phi, UT, UP, Vy, x, flap, beta, sg4, tip, hub, lre, base, t
     w = W * s
     v = w - UP
     grad = PITT_PETERS * Vy / (math.sqrt(w * w + Vy * Vy) + abs(w) + 1e-12) * x * v
+    return q, W, FM, W0, s, c, grad, F, loud
+
+
+@inlined
+def _balance(an, at, sg4, n, W, FM, s, c, UT, UP, fx):
+    """Residual of an annulus from the sums of its loads over n azimuths. [m/s]"""
+    scale = sg4 / (n * W * W)
+    return FM * (UT * s - UP * c) - scale * (an * UT + at * UP * fx[N_SWIRL])
+
+
+@inlined
+def _annulus(lookup, phi, UT, UP, Vy, x, flap, beta, sg4, tip, hub, lre, base, tab, g, fx, cs, sn, n):
+    """Residual and slope of its first guess [m/s] of one annulus, loads averaged over n azimuths."""
+    _, W, FM, W0, s, c, grad, _, _ = _mean(lookup, phi, UT, UP, Vy, x, beta, sg4, tip, hub, lre, base, tab, g, fx)
     an = 0.0
     at = 0.0
     for k in range(n):
         dT, dF = _blade(lookup, W, s, c, UT, UP, Vy, grad, flap, beta, cs[k], sn[k], lre, base, tab, g)
         an += dT
         at += dF
-    scale = sg4 / (n * W * W)
-    a = an * scale
-    b = at * scale
-    res = FM * (UT * s - UP * c) - (a * UT + b * UP * swirl)
-    return res, q, W, FM, s, c, grad, FM * W0, F, loud, an, at
+    return _balance(an, at, sg4, n, W, FM, s, c, UT, UP, fx), FM * W0
 
 
 @inlined
@@ -197,7 +207,7 @@ def _root(lookup, UT, UP, Vy, x, flap, near, i, st, lre, base, tab, g, fx, cs, s
     before_phi = 0.0
     status = NOT_CONVERGED
     for it in range(_MAX):
-        res, _, _, _, _, _, _, stiff, _, _, _, _ = _annulus(
+        res, stiff = _annulus(
             lookup, phi, UT, UP, Vy, x, flap, beta, sg4, st[i, S_TIP], st[i, S_HUB], lre, base, tab, g, fx, cs, sn, n
         )
         if not (abs(res) < 1e300):
@@ -276,9 +286,9 @@ def _point(lookup, point, st, tab, par, rounds, R, out, hub, disk, roots):
                 out[O_STATUS] = status
                 out[O_WHERE] = i
             continue
-        _, q, W, FM, s, c, grad, _, F, zone, _, _ = _annulus(
-            lookup, phi, UT, UP, Vy, x, flap, st[i, S_BETA], 0.25 * st[i, S_SIGMA], st[i, S_TIP], st[i, S_HUB], lre,
-            base, tab, g, fx, few_cs, few_sn, few,
+        q, W, FM, _, s, c, grad, F, zone = _mean(
+            lookup, phi, UT, UP, Vy, x, st[i, S_BETA], 0.25 * st[i, S_SIGMA], st[i, S_TIP], st[i, S_HUB], lre, base,
+            tab, g, fx,
         )  # fmt: skip
         out[O_MASS] += point[P_RHO] * FM * W * 2.0 * math.pi * r * st[i, S_DR]
         out[O_BRIDGED] += 1.0 if zone else 0.0

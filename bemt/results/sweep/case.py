@@ -161,8 +161,8 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
     less = None
     if without:
         off = case.replaced({"model.effects_off": (*case.file.model.effects_off, *without)})
-        conditions = at.conditions(off)
-        less = at.solve(prepared(off).at_speeds(*conditions), off, threads)
+        model = prepared(off).at_speeds(*at.conditions(off))
+        less = model.dataset(*at.solve(model, off, threads))
 
     rows: list[Row] = []
     variants: list[Row] = []

@@ -25,7 +25,7 @@ from bemt.physics.air import air_arrays
 from bemt.physics.bem.coaxial import LOADS, RATIOS
 from bemt.results.sweep.rows import Axis, GridResult, Statistics
 from bemt.rotors.case import Case
-from bemt.rotors.case.propagate import prepared, solve_at
+from bemt.rotors.case.propagate import channels_at, prepared
 
 if TYPE_CHECKING:
     from bemt.physics.air import Air
@@ -192,7 +192,8 @@ class GridSolver:
         air = states[0] if not self._air_names else air_arrays(states, here)
         if self._last[0] != geometry:
             self._last = (geometry, prepared(self.case.replaced(overrides)))
-        found = solve_at(self._last[1], flow[0], flow[1], flow[2], air, self.threads)
+        model = self._last[1]
+        found: Dataset = model.dataset(*channels_at(model, flow[0], flow[1], flow[2], air, self.threads))
         if _turned(self.case) and not np.any(flow[2]):  # axial points of an oblique grid
             return replace(found, values={**found.values, "H_force_N": np.where(found.converged, 0.0, np.nan)})
         return found

@@ -22,7 +22,6 @@ from bemt.base.errors import Fault, InputError
 from bemt.physics import coefficients as co
 from bemt.physics.air import air_arrays
 from bemt.physics.bem.coaxial import LOADS, RATIOS, PairModel
-from bemt.physics.bem.model import HUB_LOADS
 from bemt.rotors.conditioning import CAMPAIGN, SESSION, STAND, gains_at
 from bemt.rotors.model import RealRotor, coefficients
 from bemt.rotors.population import population
@@ -32,12 +31,13 @@ from bemt.rotors.validity import Validity, aside, swept_words
 if TYPE_CHECKING:
     from bemt.physics.air import Air
     from bemt.physics.bem.duct import DuctFlow
-    from bemt.physics.bem.model import Model
+    from bemt.physics.bem.model import Flags, Model
     from bemt.physics.bem.oblique_near import Near
     from bemt.physics.dataset import Dataset
     from bemt.rotors.case.load import Assumption, Case
 
 Answers = Mapping[str, Array]
+Solved = tuple[Answers, "Flags"]
 Progress = Callable[[int, int, str], None]
 
 BANDED = ("thrust_N", "torque_Nm", "power_W", "CT", "CP", "eta", "exhaust_speed_m_s", "duct_share")
@@ -70,12 +70,11 @@ class Points:
         n, V, rho, angle = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, dtype=float)) for v in given))
         return Points(case, n.ravel(), V.ravel(), rho.ravel(), angle.ravel())
 
-    def solve(self, model: Model | PairModel, changed: Case, threads: int, near: Near | None = None) -> Dataset:
-        """A model of a changed case solved at the points, near the ones solved before unless the wind turns."""
-        rpm, V, air = at = self.conditions(changed)
-        model = model.at_speeds(*at)
+    def solve(self, model: Model | PairModel, changed: Case, threads: int, near: Near | None = None) -> Solved:
+        """Channels and flags of a changed case, near the ones solved before unless the wind turns."""
+        rpm, V, air = self.conditions(changed)
         turned = changed.angle_deg != self.case.angle_deg
-        return solve_at(model, rpm, V, self.angles(changed), air, threads, None if turned else near)
+        return channels_at(model, rpm, V, self.angles(changed), air, threads, None if turned else near)
 
     def angles(self, changed: Case) -> Array:
         """Angle between wind and shaft at the points in a changed case [deg]."""
@@ -93,38 +92,16 @@ class Points:
         return rpm, V, air_arrays(airs, which.reshape(-1))
 
 
-def solve_at(
+def channels_at(
     model: Model | PairModel, rpm: Array, airspeed_m_s: Array, angle_deg: Array, air: Air, threads: int = 1,
     near: Near | None = None,
-) -> Dataset:  # fmt: skip
-    """A model at points (P,) with their angle between wind and shaft [deg].
-
-    With any angle, airspeed and J are those given, eta is T V cos(angle) / P, and the loads of the hub are there, 0 in
-    axial flow.
-    """
+) -> Solved:  # fmt: skip
+    """Channels and flags of points (P,) with their angle between wind and shaft [deg]."""
     if not np.any(angle_deg):
-        return model.solve(rpm, airspeed_m_s, air, threads)
-    along, side = parted(airspeed_m_s, angle_deg)
-    if isinstance(model, PairModel):
-        found = model.solve(rpm, along, air, threads, side)
-    else:
-        found = model.solve(rpm, along, air, threads, side, near)
-    J = np.asarray(co.J(airspeed_m_s, found.rpm / 60.0, model.diameter_m))
-    none = dict.fromkeys(HUB_LOADS, np.where(found.converged, 0.0, np.nan))
-    own = {"airspeed_m_s": airspeed_m_s, "J": J, "eta": co.eta(along / (found.rpm / 60.0) / model.diameter_m,
-           found.CT, found.CP), "sideslip_rad": np.arctan2(side, along)}  # fmt: skip
-    return replace(found, values={**none, **found.values, **own})
+        return model.channels(rpm, airspeed_m_s, air, threads)
+    from bemt.rotors.case.oblique import turned
 
-
-def parted(airspeed_m_s: Array, angle_deg: Array) -> tuple[Array, Array]:
-    """Speeds along the shaft and in the plane of the disk [m/s] of a wind at an angle to the shaft.
-
-    >>> parted(np.array([10.0, 10.0]), np.array([0.0, 90.0]))[0].round(12)
-    array([10.,  0.])
-    """
-    side = np.where(angle_deg % 180.0 == 0.0, 0.0, np.abs(airspeed_m_s * np.sin(np.radians(angle_deg))))
-    along = np.where(angle_deg % 180.0 == 90.0, 0.0, airspeed_m_s * np.cos(np.radians(angle_deg)))
-    return along, side
+    return turned(model, rpm, airspeed_m_s, angle_deg, air, threads, near)
 
 
 @dataclass(frozen=True, eq=False)
@@ -289,7 +266,7 @@ def propagate(
         near = oblique_near.Near()
     steps, done = 2 + sum(len(item.values) for item in (*declared, *of_second)), 0
 
-    def solved(changed: Case, what: str, second: Case | None = None) -> tuple[Model | PairModel, Dataset]:
+    def solved(changed: Case, what: str, second: Case | None = None) -> tuple[Model | PairModel, Solved]:
         nonlocal done
         model = prepared(changed, None, second).at_speeds(*points.conditions(changed))
         found = points.solve(model, changed, threads, near)
@@ -298,16 +275,21 @@ def propagate(
             progress(done, steps, what)
         return model, found
 
-    def channels(found: Dataset) -> dict[str, Array]:
+    def channels(found: Answers | Dataset) -> dict[str, Array]:
         keys = (*BANDED, *LOADS, *RATIOS) if case.paired else BANDED
         return {key: np.asarray(found[key], dtype=float) for key in keys}
 
     def along(model: Model | PairModel) -> Dataset:
         """Axial flow at the speed along the shaft."""
         rpm, V, air = points.conditions(case)
-        return model.solve(rpm, parted(V, points.angle_deg)[0], air, threads)
+        if np.any(skewed):
+            from bemt.rotors.case.oblique import parted
 
-    model, found = solved(case, "nominal")
+            V = parted(V, points.angle_deg)[0]
+        return model.solve(rpm, V, air, threads)
+
+    model, own = solved(case, "nominal")
+    found = model.dataset(*own)
     beside = along(model) if np.any(skewed) else found
     if isinstance(model, PairModel):
         from bemt.rotors.case.pair_error import PairError
@@ -323,9 +305,9 @@ def propagate(
         return Propagated(replace(found, flags=flags), nominal, (), None, model, nothing)
     finer = channels(along(prepared(case, 2 * case.file.model.stations).at_speeds(*points.conditions(case))))
     refined = {key: nominal[key] + (finer[key] - v) for key, v in channels(beside).items()}
-    moved = vary(case, nominal, lambda changed, what: channels(solved(changed, what)[1]), declared)
+    moved = vary(case, nominal, lambda changed, what: channels(solved(changed, what)[1][0]), declared)
     if of_second:
-        moved += vary(case.second(), nominal, lambda changed, what: channels(solved(case, what, changed)[1]),
+        moved += vary(case.second(), nominal, lambda changed, what: channels(solved(case, what, changed)[1][0]),
                       of_second)  # fmt: skip
     if isinstance(model, PairModel):
         narrow, wide = error.widths()
