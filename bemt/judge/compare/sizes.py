@@ -13,8 +13,9 @@ from bemt.physics.effects import Parameter
 
 Found = Mapping[str, Size]
 """Parameters of one effect, by name."""
-_WORD = {"thrust_N": "thrust", "torque_Nm": "torque", "rpm": "speed", "airspeed_m_s": "airspeed",
-         "density_kg_m3": "density", "loads": "thrust and torque"}  # fmt: skip
+READ = {"thrust_N": "thrust", "torque_Nm": "torque", "rpm": "speed", "airspeed_m_s": "airspeed",
+        "density_kg_m3": "density", "loads": "thrust and torque"}  # fmt: skip
+"""What a sensor reads, in a word."""
 _UNIT = {"thrust_N": "N", "torque_Nm": "N m", "rpm": "rev/min"}
 _SEEN = 0.05  # least probability of a value that is listed
 
@@ -29,9 +30,11 @@ def titled(name: str, found: Found, largest: Mapping[str, float] | None = None) 
         return title
     told = _stated(name, found) or _likeliest(found)
     sizes = [p for p in cls.parameters if p.off is not None and (p.steps or p.name == "eps") and p.name in found]
-    value = found[sizes[0].name].value if len(sizes) == 1 else None
-    if not told and isinstance(value, float) and (sizes[0].unit != "1" or _is_share(sizes[0])):
-        told = sized(sizes[0], value, "+.3g") + of_largest(name, sizes[0].name, value, largest or {})
+    p, size = (sizes[0], found[sizes[0].name]) if len(sizes) == 1 else (None, None)
+    shown = not told and p and size and isinstance(size.value, float) and (p.unit != "1" or _is_share(p))
+    if p and size and shown and not size.low < p.off < size.high:
+        told = sized(p, size.value, "+.3g" if p.low < 0.0 else ".3g")
+        told += of_largest(name, p.name, size.value, largest or {})
     return f"{title} ({told})" if told else title
 
 
@@ -68,7 +71,7 @@ def _likeliest(found: Found) -> str:
 
 def _of_unit(found: Found, unit: str) -> str:
     joint = " " if unit.startswith("taken") else " of " if unit.startswith("the other") else " in "
-    return f"{_WORD[found['channel'].value]}{joint}{unit}"
+    return f"{READ[found['channel'].value]}{joint}{unit}"
 
 
 def _of_speed(factor: float) -> str:

@@ -359,15 +359,18 @@ def finding(problem: Problem) -> str:
         return f"at one speed the readings differ, {told}: what changes between them is not recorded" if told else ""
     turned = {c: " of the other sign," if v < 0.0 else "" for c, v in found.items()}
     off = " and ".join(f"{names[c]} is{turned[c]} {number_text(abs(v), 3)} times" for c, v in found.items())
-    ranked = "; ".join(f"{k}. {s.words}" for k, s in enumerate(suspects(problem)[:_SHOWN], 1))
-    return f"{off} what the case gives. Is it this rotor? Most likely: {ranked}"
+    return f"{off} what the case gives. Is it this rotor? Most likely: {nearest_slips(problem)}"
+
+
+def nearest_slips(problem: Problem) -> str:
+    """Slips that would explain the level of the loads, the likeliest first, in words."""
+    return "; ".join(f"{k}. {s.words}" for k, s in enumerate(suspects(problem)[:_SHOWN], 1))
 
 
 def to_mend(problem: Problem) -> str:
     """What comes before any run: whose rotor it is, or what cannot be so; "" where nothing is wrong."""
     if _suspicious(levels(problem)):
-        slips = "; ".join(f"{k}. {s.words}" for k, s in enumerate(suspects(problem)[:_SHOWN], 1))
-        return f"check that the case describes this rotor; other explanations for the loads: {slips}"
+        return "check that the case describes this rotor, and look at the file"
     file, _, correction = contradiction(problem)
     return f"correct {file} before any run: {correction}" if file else ""
 

@@ -39,8 +39,8 @@ if TYPE_CHECKING:
     from bemt.judge.diagnose.posterior import Evidence
 
 REFERENCE = (
-    "a reference run: the same rotor, stand and points without the suspected cause (before the change, or another "
-    "rotor of this type that is known to be right)"
+    "a reference run: the same stand and points with the rotor before the change, or with another one of this type "
+    "that is known to be right"
 )
 """The run that settles most: it shows how far model and stand differ anyway."""
 
@@ -125,11 +125,8 @@ class Suggestion:
 
     @property
     def tells(self) -> str:
-        """What it separates and by how much, in words."""
-        if not self.separates:
-            return ""
-        both = f"{self.after:.1f} instead of {self.before:.1f}"
-        return f" (tells {' from '.join(map(title_of, self.separates))} at {both} standard deviations)"
+        """What it separates, in words; "" for nothing."""
+        return f"tells {' from '.join(map(title_of, self.separates))}" if self.separates else ""
 
     def document(self) -> Mapping[str, object]:
         """Plain values for JSON."""
