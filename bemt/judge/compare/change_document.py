@@ -21,10 +21,13 @@ from bemt.judge.compare.matched import LOADS, OVER_COMMAND, WITHOUT_SPEED
 from bemt.judge.compare.recordings import IN_WIND, NO_SPEED, NOTHING_SHARED, OTHER_STAND, REVERSED, RunChange
 from bemt.judge.compare.selection import Invocation
 from bemt.judge.compare.sentences import (
+    FAR_OFF,
+    MEND_ROWS,
     NO_CHANGE,
     Way,
     Wrong,
     claimed,
+    first_mend,
     likeliest,
     moved,
     of_files,
@@ -64,7 +67,9 @@ _STEPS = 2  # that are offered at once
 def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
     """Run or reading that would settle the answer, and the command to give then, with all that was asked."""
     said = change.leading
-    if change.other_setup and said.verdict in ("none", "insufficient"):
+    if first_mend(change.notes, said.verdict):
+        text, command = MEND_ROWS, ""
+    elif change.other_setup and said.verdict in ("none", "insufficient"):
         text, command = ONE_SETUP, ""
     elif said.verdict == "none":
         text, command = _to_see_more(change, asked)
@@ -236,7 +241,7 @@ _GUESS = 0.1  # probability from which a cause is likely
 
 def text(doc: ComparedRuns, details: bool = False) -> str:
     """Lines of a comparison."""
-    lines = wrapped(headline(doc), "", "")
+    lines = wrapped(f"{first_mend(doc.notes, doc.verdict)} {headline(doc)}".strip(), "", "")
     lines += [verdict_line(doc.verdict, doc.effects), *_said(doc)]
     rows = []
     for channel, r in doc.ratios.items():
@@ -255,7 +260,7 @@ def text(doc: ComparedRuns, details: bool = False) -> str:
     if details:
         lines += _tables(doc)
     lines += [line for a in doc.assumed for line in wrapped(f"assumed: {a}")]
-    notes = [n for n in doc.notes if not n.startswith(recordings.ERROR_IN)]
+    notes = [n for n in doc.notes if not n.startswith((*recordings.ERROR_IN, FAR_OFF))]
     notes = notes if details else [n for n in notes if not n.startswith(("A: ", "B: "))][:_NOTES]
     lines += [f"  note: {n}" for n in notes]
     return "\n".join(lines)

@@ -21,6 +21,8 @@ from bemt.judge.compare import drive_laws, matched
 from bemt.judge.compare import smooth_change as fits
 from bemt.judge.compare.drive_laws import Judgement, Load
 from bemt.judge.compare.matched import LOADS, MatchedChannel, StandRun, advance, density_change
+from bemt.judge.compare.odd_rows import odd_rows
+from bemt.judge.compare.sentences import FAR_OFF
 from bemt.judge.explanation import NONE, Size
 from bemt.judge.loss import SECOND, Decision, decide, joined, parts
 
@@ -354,8 +356,7 @@ def _assumed(a: StandRun, b: StandRun, diameter: float, loads: Mapping[str, Matc
         told = [("equal air density and still air", "22C,1013hPa,18m/s", still)]
     said = (
         (by_thermometer, "air pressure is not recorded in both: taken as equal within 1 %"),
-        *((True, f"{words} in {' and '.join(letters)} (not recorded; "
-                 f"{' and '.join(f'--air-{n.lower()}' for n in letters)} {how} states it)")
+        *((True, f"{words} in {' and '.join(letters)} (not recorded; state it as in --air-{letters[0].lower()} {how})")
           for words, how, letters in told),
         ("torque" not in loads and "thrust" in loads,
          "torque is not recorded in both: thrust alone cannot tell gain, air and blade apart"),
@@ -376,6 +377,8 @@ def _notes(
 ) -> list[str]:  # fmt: skip
     other = cfd_setup.other_setup(a.setup, b.setup)
     out = [f"computed otherwise: {other}"] if other else []
+    runs = (("A", a, b), ("B", b, a))
+    out += [f"{FAR_OFF}{letter}: {words}" for letter, run, other in runs if (words := odd_rows(run, other))]
     out += [_misread(letter, run) for letter, run in (("A", a), ("B", b)) if run.misread[0]]
     out += [note for c in channels.values() for note in c.notes]
     out += [

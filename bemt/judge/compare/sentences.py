@@ -22,6 +22,9 @@ WORD = {
 }  # fmt: skip
 NO_CHANGE = "no change, only what two runs differ by"
 """Explanation without a cause where two recordings are compared."""
+FAR_OFF = "rows far off all others in "
+"""Start of a note on single rows that the rest of A or B contradicts."""
+MEND_ROWS = "look at these rows, mend or delete what is mistyped or exchanged, and ask again"
 _PERCENT = (0.5, 2.0)  # ratios between these are said in percent
 _PULSE = 0.01  # a command below is a pulse width [s], above a throttle [1]
 _LEAST, _SURE = 0.01, 0.995  # probabilities beyond are not told with two digits
@@ -29,7 +32,7 @@ _MOST = 3  # causes that are told where none is claimed
 _LIKELIER = 0.5  # probability from which a cause is likelier than all others together
 _LINE = 110
 _UNITS = re.compile(r"(?<=\d) (?=(?:%|N|W|deg|rev/min|m/s|m)(?!\w))|(?<=\d N) (?=m(?!\w))")
-_QUIET = 0.05  # probability of no change from which on one is not certain
+_QUIET = 0.05  # probability of no change from which on a change is not certain, and of a cause that is told
 _MERIT, _OF_MERIT = "figure of merit", ("thrust_N", "torque_Nm", "rpm", "loads")  # relation, and what it is made of
 
 
@@ -97,6 +100,12 @@ def something(P: Mapping[Explanation, float]) -> str:
     return "Something changed" if P.get(NONE, 0.0) < _QUIET else "Something may have changed"
 
 
+def first_mend(notes: Sequence[str], verdict: str) -> str:
+    """Rows that have to be looked at before any cause; "" where they change nothing or there are none."""
+    found = [] if verdict == "none" else [note for note in notes if note.startswith(FAR_OFF)]
+    return f"First look at {'; '.join(found)}." if found else ""
+
+
 def others(ways: Sequence[Way]) -> list[str]:
     """What else a class may be, each once."""
     return [f"It may also be: {'; '.join(map(str, ways[1:]))}."] if len(ways) > 1 else []
@@ -113,7 +122,7 @@ def likeliest(P: Mapping[Explanation, float], title: Callable[[Explanation], str
              DOUBT: "another rotor, unit or file than stated"}  # fmt: skip
     told, causes = [], 0
     for k, p in sorted(P.items(), key=lambda kv: -kv[1]):
-        if p < _LEAST or causes == _MOST:
+        if causes == _MOST or p < (_QUIET if causes else _LEAST):
             break
         told.append(Way(words[k] if k in words else title(k), p))
         causes += bool(k.ids)

@@ -15,6 +15,7 @@ from bemt.base.gaussian.whitening import whitener
 from bemt.judge import loss
 from bemt.judge.compare.change_document import ONE_SETUP
 from bemt.judge.compare.recordings import RunChange
+from bemt.judge.compare.sentences import MEND_ROWS, first_mend
 from bemt.judge.diagnose import by_laws, form, knowledge, noise, other_rotor, posterior, signatures
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import suggest as suggestion
@@ -122,7 +123,7 @@ def _diagnose(
     @cache
     def settling() -> suggestion.Suggestion:
         with posterior.one_thread():
-            return _next(found, decision, best, given)
+            return _next(found, decision, best, given, () if change is None else change.notes)
 
     return Diagnosis(
         found, decision, decision, best, parameters, found.p_value, where, _scores(found, after, held, gp_only), words,
@@ -186,10 +187,12 @@ def _scores(found: posterior.Evidence, after: Array, held: Array, gp_only: Array
 
 
 def _next(
-    found: posterior.Evidence, decision: loss.Decision, best: fitting.Fit, given: suggestion.Given
-) -> suggestion.Suggestion:
-    """What settles the question, and what to type then."""
-    chosen = _settling(found, decision, best)
+    found: posterior.Evidence, decision: loss.Decision, best: fitting.Fit, given: suggestion.Given,
+    notes: Sequence[str] = (),
+) -> suggestion.Suggestion:  # fmt: skip
+    """What settles the question, and what to type then; ``notes`` on the change from the reference."""
+    odd = first_mend(notes, decision.verdict)
+    chosen = suggestion.Suggestion(MEND_ROWS, "mend") if odd else _settling(found, decision, best)
     if not chosen.kind and decision.verdict == "named":  # nothing is open: into the case with it
         return replace(chosen, text="no further run is needed; write the case with it",
                        commands=(f"{given.command()} --out improved",))  # fmt: skip

@@ -12,10 +12,12 @@ from bemt.base.tables import or_null, text_table
 from bemt.data.recordings.channels import AS_ELECTRICAL, AS_SHAFT
 from bemt.judge.compare.drive_laws import title_of
 from bemt.judge.compare.sentences import (
+    FAR_OFF,
     NO_CHANGE,
     Way,
     Wrong,
     claimed,
+    first_mend,
     likeliest,
     moved,
     of_files,
@@ -117,7 +119,9 @@ def told(d: Diagnosis) -> Told:
     against = [*_files(d), *_of_another_rotor(d), *_level_alone(d), *_reference_off(d), *_of_loads(d),
                *(f"{words[:1].upper()}{words[1:]}." for words in d.problem.no_check)]  # fmt: skip
     details = [*_signs(d), *_beyond(d), *(f"Model: {words}." for words in d.problem.validity), _gain(d)]
-    return Told(headline(d), _seen(d), _causes(d), against, details, _next(d), _not_tried(d))
+    odd = first_mend(() if (change := _change(d)) is None else change.notes, d.said.verdict)
+    odd = odd.replace(f"{FAR_OFF}A", f"{FAR_OFF}the reference").replace(f"{FAR_OFF}B", f"{FAR_OFF}the recording")
+    return Told(f"{odd} {headline(d)}".strip(), _seen(d), _causes(d), against, details, _next(d), _not_tried(d))
 
 
 def explanation(d: Diagnosis) -> list[str]:
