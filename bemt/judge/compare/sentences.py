@@ -153,16 +153,19 @@ def seen(ratios: Mapping[str, Ratio], lead: str, drive: bool = False) -> list[st
 
 
 def _along(loads: Mapping[str, Ratio]) -> Iterator[str]:
-    """How a ratio changes along the speed; in words where it changes along something else."""
+    """How ratios change along the speed, with their ends; in words where they change along something else."""
+    rest: dict[str, list[str]] = {}
     for c, r in loads.items():
         (slow, _, low, *_), (fast, _, high, *_) = r.curve[0], r.curve[-1]
         if r.depends_on == ("speed",) and r.kind in LOADS and fast > slow:
             ends = zip(shares(low * r.density_ratio, high * r.density_ratio), (slow, fast), strict=True)
             told = ", ".join(f"{size} at {math.exp(x):.0f}" for size, x in ends)
-            yield f"{WORD[c].capitalize()} changes with speed: {told} rev/min."
+            yield f"The change of {WORD[c]} depends on speed: {told} rev/min."
         elif r.depends_on:
-            at = {"at_power": "electrical power", "at_command": "command"}.get(r.kind, "speed or advance ratio")
-            yield f"The ratio of {WORD[c]} changes with {at}."
+            of = {"speed": WITHOUT_SPEED.get(r.kind, "speed"), "advance": "advance ratio"}
+            rest.setdefault(" and ".join(of[k] for k in r.depends_on), []).append(WORD[c])
+    for along, names in rest.items():
+        yield f"The change of {' and '.join(names)} depends on {along}."
 
 
 def of_what(channel: str, r: Ratio) -> str:

@@ -300,6 +300,7 @@ def _diagnosed(
     told = [f"The case {case.name}, with A as reference:", *told] if told else []
     verdict, effects, probability, ranking, rule = (by_case[k] for k in DIAGNOSED)
     return replace(said, verdict=verdict, effects=tuple(effects), probability=probability, rule=rule,
+                   sets=tuple(map(tuple, by_case["sets"])),
                    ranking=rows_of(RankedCause, ranking), diagnosis=by_case, case=case.name,
                    told=tuple(told), full_scale=full_scale(answer))  # fmt: skip
 
