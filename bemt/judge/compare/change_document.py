@@ -36,7 +36,6 @@ from bemt.judge.compare.sentences import (
     seen,
     something,
     verdict_line,
-    with_change,
     wrapped,
 )
 from bemt.judge.compare.sizes import titled
@@ -77,7 +76,8 @@ def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
         text, command = "", ""
     elif said.verdict in ("named", "sensor"):
         check = next(filter(None, map(check_of, said.effects)), "read the label of the channel")
-        text, command = f"to be sure, {check}", ""
+        text = f"to be sure, {check}"
+        command = asked.command(case=asked.case or "CASE") if said.verdict == "named" else ""
     else:
         text, command = _lacking(change, asked) or _quickest_checks(change, asked)
     return {"text": text, "command": command}
@@ -283,8 +283,7 @@ def headline(doc: ComparedRuns) -> str:
     if doc.effects == ("air_density",) and doc.rule.startswith(recordings.AS_RECORDED):
         return f"Nothing but the air changed, as recorded{size}; the coefficients agree."
     beside, sets = doc.rule.endswith(BESIDE), doc.sets or (doc.effects,)
-    what = claimed(verdict, doc.probability or 0.0, sets, _ways(doc), partial(_title, doc), beside)
-    return with_change(what, change)
+    return claimed(verdict, doc.probability or 0.0, sets, _ways(doc), partial(_title, doc), beside, change)
 
 
 def _title(doc: ComparedRuns, name: str) -> str:

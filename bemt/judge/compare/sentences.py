@@ -28,7 +28,7 @@ MEND_ROWS = "look at these rows, mend or delete what is mistyped or exchanged, a
 _PERCENT = (0.5, 2.0)  # ratios between these are said in percent
 _PULSE = 0.01  # a command below is a pulse width [s], above a throttle [1]
 _LEAST, _SURE = 0.01, 0.995  # probabilities beyond are not told with two digits
-_MOST = 3  # causes that are told where none is claimed
+_MOST, _GUESS = 3, 0.1  # causes that are told where none is claimed, and more that are as likely as this
 _LIKELIER = 0.5  # probability from which a cause is likelier than all others together
 _LINE = 110
 _UNITS = re.compile(r"(?<=\d) (?=(?:%|N|W|deg|rev/min|m/s|m)(?!\w))|(?<=\d N) (?=m(?!\w))")
@@ -68,31 +68,34 @@ class Way(NamedTuple):
 
 def claimed(
     verdict: str, probability: float, sets: Sequence[Sequence[str]], ways: Sequence[Way], title: Callable[[str], str],
-    beside: bool,
+    beside: bool, change: str,
 ) -> str:  # fmt: skip
-    """What is wrong, by how much and how sure, of a verdict that gives a cause; ``beside`` as of a decision.
+    """What is wrong, by how much and how sure, of a verdict that gives a cause, and the ``change`` that was measured.
+
+    ``beside`` as of a decision.
 
     >>> both = [Way("gain", 0.6), Way("zero", 0.3)]
-    >>> claimed("class", 0.9, (("gain", "zero"),), both, str, False)
-    'Most likely gain, probability 0.60'
-    >>> claimed("class", 0.9, (("gain",), ("zero", "duct")), both, str, False)
-    'Two causes, probability 0.90: gain and one of (zero / duct)'
+    >>> claimed("class", 0.9, (("gain", "zero"),), both, str, False, "thrust +5.0 %")
+    'Most likely gain, probability 0.60; thrust +5.0 %.'
+    >>> claimed("class", 0.9, (("gain",), ("zero", "duct")), both, str, False, "")
+    'Two causes, probability 0.90: gain and one of (zero / duct).'
     """
     if verdict != "class":
         where = " in the stand, not the air" if verdict == "sensor" else ""
         what = " and ".join(title(i) for one in sets for i in one)
-        return f"Cause found{where}: {what}, probability {odds(probability)}"
-    if beside:
-        return f"Cause found: {title(sets[0][0])}; possibly also {' or '.join(map(title, sets[1]))}"
-    if len(sets) > 1:
+        told = f"Cause found{where}: {what}, probability {odds(probability)}"
+    elif beside:
+        told = f"Cause found: {title(sets[0][0])}; possibly also {' or '.join(map(title, sets[1]))}"
+    elif len(sets) > 1:
         each = [" / ".join(map(title, one)) for one in sets]
         each = [f"one of ({words})" if " / " in words else words for words in each]
-        return f"Two causes, probability {odds(probability)}: {' and '.join(each)}"
-    first = ways[0]
-    if first.probability >= _LIKELIER:
-        return f"Most likely {first.title}, probability {odds(first.probability)}"
-    alike = f"One of {len(ways)} causes that these readings cannot tell apart"
-    return f"{alike}, likeliest {first.title} ({odds(first.probability)})"
+        told = f"Two causes, probability {odds(probability)}: {' and '.join(each)}"
+    elif ways[0].probability >= _LIKELIER:
+        told = f"Most likely {ways[0].title}, probability {odds(ways[0].probability)}"
+    else:  # little is known of the cause
+        alike = f"one of {len(ways)} causes that these readings cannot tell apart, likeliest {ways[0]}"
+        told, change = f"{change}: {alike}" if change else alike, ""
+    return f"{told[0].upper()}{told[1:]}{f'; {change}' if change else ''}."
 
 
 def something(P: Mapping[Explanation, float]) -> str:
@@ -122,7 +125,7 @@ def likeliest(P: Mapping[Explanation, float], title: Callable[[Explanation], str
              DOUBT: "another rotor, unit or file than stated"}  # fmt: skip
     told, causes = [], 0
     for k, p in sorted(P.items(), key=lambda kv: -kv[1]):
-        if causes == _MOST or p < (_QUIET if causes else _LEAST):
+        if p < (_GUESS if causes >= _MOST else _QUIET if causes else _LEAST):
             break
         told.append(Way(words[k] if k in words else title(k), p))
         causes += bool(k.ids)
@@ -187,11 +190,6 @@ def _range(r: Ratio) -> str:
     if high - low < 1e-9:
         return "advance ratio {:.2f} to {:.2f}".format(*r.advance_range)
     return f"{math.exp(low):.0f} to {math.exp(high):.0f} rev/min"
-
-
-def with_change(words: str, change: str) -> str:
-    """Sentence of a cause, and what was measured."""
-    return f"{words}{f'; {change}' if change else ''}."
 
 
 def verdict_line(verdict: str, effects: Sequence[str]) -> str:

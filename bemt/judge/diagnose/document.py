@@ -25,7 +25,6 @@ from bemt.judge.compare.sentences import (
     seen,
     something,
     verdict_line,
-    with_change,
     wrapped,
 )
 from bemt.judge.compare.sizes import in_words, of_largest, sized, titled
@@ -121,7 +120,15 @@ def told(d: Diagnosis) -> Told:
     details = [*_signs(d), *_beyond(d), *(f"Model: {words}." for words in d.problem.validity), _gain(d)]
     odd = first_mend(() if (change := _change(d)) is None else change.notes, d.said.verdict)
     odd = odd.replace(f"{FAR_OFF}A", f"{FAR_OFF}the reference").replace(f"{FAR_OFF}B", f"{FAR_OFF}the recording")
-    return Told(f"{odd} {headline(d)}".strip(), _seen(d), _causes(d), against, details, _next(d), _not_tried(d))
+    return Told(
+        f"{odd} {headline(d)}".strip(),
+        [*_left_open(d), *_seen(d)],
+        _causes(d),
+        against,
+        details,
+        _next(d),
+        _not_tried(d),
+    )
 
 
 def explanation(d: Diagnosis) -> list[str]:
@@ -250,11 +257,8 @@ def _odds(told: Size) -> str:
 
 
 def _files(d: Diagnosis) -> list[str]:
-    """What the files contradict, leave open or lose."""
-    problem, notes = d.problem, d.problem.notes
-    marks = [NO_SPEED, AS_ELECTRICAL, POWER_OPEN]
-    if d.said.verdict != "none" and abs(problem.level.get("torque_Nm", 0.0)) > LEVEL:
-        marks.append(AS_SHAFT)
+    """What the files contradict or lose."""
+    problem = d.problem
     question, wrong, rest = other_rotor.finding(problem), [], []
     kinds = [
         {m[2] for f in p.record.findings if (m := _FINDING.fullmatch(f))} for p in problem.parts if p.record.reference
@@ -269,9 +273,15 @@ def _files(d: Diagnosis) -> list[str]:
     found = [*of_files(wrong, cause), *rest]
     if left := found[_FINDINGS:]:
         found[_FINDINGS - 1 :] = [f"{found[_FINDINGS - 1]} And {len(left)} more; `import` shows all."]
-    open_ = (f"{note}." for note in notes if any(mark in note for mark in marks))
-    dropped = (f"{note}." for note in notes if DROPPED in note)
-    return [*(f"In the file: {words}" for words in open_), *found, *(f"In the file: {words}" for words in dropped)]
+    return [*found, *(f"In the file: {note}." for note in problem.notes if DROPPED in note)]
+
+
+def _left_open(d: Diagnosis) -> list[str]:
+    """What the files leave open and was taken in another way than they say, so that all else hangs on it."""
+    marks = [NO_SPEED, AS_ELECTRICAL, POWER_OPEN]
+    if d.said.verdict != "none" and abs(d.problem.level.get("torque_Nm", 0.0)) > LEVEL:
+        marks.append(AS_SHAFT)
+    return [f"In the file: {note}." for note in d.problem.notes if any(mark in note for mark in marks)]
 
 
 def _reference_off(d: Diagnosis) -> list[str]:
@@ -359,9 +369,9 @@ def headline(d: Diagnosis) -> str:
         return _agreement(d)
     change = _moved(d)
     if said.verdict in CLAIMS:
-        sets = said.sets or (said.effects,)
-        what = claimed(said.verdict, said.probability, sets, _ways(d), lambda i: _title(d, i), said.beside)
-        return with_change(what, f"{change} against the reference" * bool(change) + _in_both(d))
+        sets, against = said.sets or (said.effects,), f"{change} against the reference" if change else ""
+        against += _in_both(d)
+        return claimed(said.verdict, said.probability, sets, _ways(d), lambda i: _title(d, i), said.beside, against)
     if said.verdict == "insufficient" and (other_rotor.foreign(d.problem) or other_rotor.doubted(d.problem, said)):
         return f"These are not the loads of this case ({_off(d)}): check diameter, blades, units and speed first."
     file, wrong, _ = other_rotor.contradiction(d.problem)
@@ -437,7 +447,11 @@ def text(d: Diagnosis, details: bool = False, lead: str = "") -> str:
     out = [*wrapped(f"{lead} {said.first}".strip(), "", ""), verdict_line(d.said.verdict, d.said.effects)]
     body = [*said.seen, *said.causes, *said.against]
     if not details:
-        body = _few(body, said.causes, _LINES - len(out) - len([line for w in said.step for line in wrapped(w)]))
+        body = _few(
+            body,
+            [*_left_open(d), *said.causes],
+            _LINES - len(out) - len([line for w in said.step for line in wrapped(w)]),
+        )
     lines = [*body, *(said.details if details else []), *said.step]
     out += [line for words in lines for line in wrapped(words)]
     if details:
