@@ -60,7 +60,7 @@ _TOLD = (*recordings.AS_RECORDED, "voltage as recorded")
 # Scatter of readings at one speed, share, that no stand has: something else changes from reading to reading.
 _RESTLESS = 0.10
 _REPEAT = "repeat the run of A and compare it with A: so much two runs differ by without a cause"
-_STEPS = 2  # that are offered at once
+_STEPS, _NEARLY = 2, 0.5  # that are offered at once; share of the largest probability that is nearly as much
 
 
 def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
@@ -136,10 +136,13 @@ def _quickest_checks(change: RunChange, asked: Invocation) -> tuple[str, str]:
     said = change.leading
     members = [k for k in said.effects if check_of(k)]
     order = checks_by_worth(said.ranked, minutes("reference", len(change.a.points)))
-    # that of the likeliest first: a second rotor or a duct, which anybody would see, too
-    first = [*next((k for k in said.ranked if k.ids), NONE)] if next(iter(said.ranked), NONE) != NONE else []
     firsts: dict[str, str] = {}
-    for cause in [k for k in (*first, *order) if k in members or said.verdict != "class"] or members:
+    causes = [k for k in said.ranked if k.ids]
+    if causes and next(iter(said.ranked)) != NONE:
+        # the likeliest first, also what anybody would see; beside that the best of what is nearly as likely
+        near = {i for k in causes if said.ranked[k] >= _NEARLY * said.ranked[causes[0]] for i in k}
+        order = [*causes[0], *(k for k in order if k in near), *order]
+    for cause in [k for k in order if k in members or said.verdict != "class"] or members:
         firsts.setdefault(FAMILY.get(cause, cause), check_of(cause) if cause else _REPEAT)
     told = [*filter(None, firsts.values())][:_STEPS] or [_REPEAT]
     again = {"b": "A_AGAIN.csv", "rows_b": asked.rows_a, "air_b": asked.air_a}

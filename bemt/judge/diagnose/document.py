@@ -178,7 +178,8 @@ def _causes(d: Diagnosis) -> list[str]:
     said, problem = d.said, d.problem
     if said.verdict in ("named", "sensor"):
         size = _parameters(d)
-        return [f"Size: {size}; 90 % in brackets."] if size else []
+        brackets = "; 90 % in brackets" if " to " in size else ""
+        return [f"Size: {size}{brackets}."] if size and size not in headline(d) else []
     if said.verdict == "class":
         return others(_ways(d)) if len(said.sets) < 2 else []
     if said.verdict == "unknown":
