@@ -16,28 +16,11 @@ from bemt.base.document import Documented
 from bemt.base.tables import or_null, text_table
 from bemt.base.unit_errors import speed_ratios
 from bemt.judge.compare import recordings
+from bemt.judge.compare import sentences as say
 from bemt.judge.compare.drive_laws import FAMILY, Judgement, check_of, title_of
 from bemt.judge.compare.matched import LOADS, OVER_COMMAND, WITHOUT_SPEED
 from bemt.judge.compare.recordings import IN_WIND, NO_SPEED, NOTHING_SHARED, OTHER_STAND, REVERSED, RunChange
 from bemt.judge.compare.selection import Invocation
-from bemt.judge.compare.sentences import (
-    FAR_OFF,
-    MEND_ROWS,
-    NO_CHANGE,
-    Way,
-    Wrong,
-    claimed,
-    first_mend,
-    likeliest,
-    moved,
-    of_files,
-    of_what,
-    others,
-    seen,
-    something,
-    verdict_line,
-    wrapped,
-)
 from bemt.judge.compare.sizes import titled
 from bemt.judge.compare.smooth_change import Ratio
 from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation, Size
@@ -66,8 +49,8 @@ _STEPS, _NEARLY = 2, 0.5  # that are offered at once; share of the largest proba
 def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
     """Run or reading that would settle the answer, and the command to give then, with all that was asked."""
     said = change.leading
-    if first_mend(change.notes, said.verdict):
-        text, command = MEND_ROWS, ""
+    if say.first_mend(change.notes, said.verdict):
+        text, command = say.MEND_ROWS, ""
     elif change.other_setup and said.verdict in ("none", "insufficient"):
         text, command = ONE_SETUP, ""
     elif said.verdict == "none":
@@ -244,8 +227,8 @@ _GUESS = 0.1  # probability from which a cause is likely
 
 def text(doc: ComparedRuns, details: bool = False) -> str:
     """Lines of a comparison."""
-    lines = wrapped(f"{first_mend(doc.notes, doc.verdict)} {headline(doc)}".strip(), "", "")
-    lines += [verdict_line(doc.verdict, doc.effects), *_said(doc)]
+    lines = say.wrapped(f"{say.first_mend(doc.notes, doc.verdict)} {headline(doc)}".strip(), "", "")
+    lines += [say.verdict_line(doc.verdict, doc.effects), *_said(doc)]
     rows = []
     for channel, r in doc.ratios.items():
         raw = r.ratio * r.density_ratio
@@ -254,7 +237,7 @@ def text(doc: ComparedRuns, details: bool = False) -> str:
         if over_speed and r.slope is not None and r.slope_error is not None and r.slope_error < _NO_SLOPE:
             slope = f"{100.0 * r.slope:+.1f} ± {100.0 * r.slope_error:.1f} %"
         more = [slope, f"{100.0 * r.scatter:.1f} %", "{}, {}".format(*r.points)]
-        rows.append([of_what(channel, r), f"{raw:.4f}", *_ends(r, r.density_ratio), *more])
+        rows.append([say.of_what(channel, r), f"{raw:.4f}", *_ends(r, r.density_ratio), *more])
         if abs(r.density_ratio - 1.0) > 1e-6:
             coefficient = "CT" if channel == "thrust_N" else "CP"
             rows.append([f"  {coefficient} (corrected for density)", f"{r.ratio:.4f}", *_ends(r), "", "", ""])
@@ -262,8 +245,8 @@ def text(doc: ComparedRuns, details: bool = False) -> str:
     lines += ["", text_table(header, rows, left=(0,), indent="  ")]
     if details:
         lines += _tables(doc)
-    lines += [line for a in doc.assumed for line in wrapped(f"assumed: {a}")]
-    notes = [n for n in doc.notes if not n.startswith((*recordings.ERROR_IN, FAR_OFF))]
+    lines += [line for a in doc.assumed for line in say.wrapped(f"assumed: {a}")]
+    notes = [n for n in doc.notes if not n.startswith((*recordings.ERROR_IN, say.FAR_OFF))]
     notes = notes if details else [n for n in notes if not n.startswith(("A: ", "B: "))][:_NOTES]
     lines += [f"  note: {n}" for n in notes]
     return "\n".join(lines)
@@ -271,14 +254,14 @@ def text(doc: ComparedRuns, details: bool = False) -> str:
 
 def headline(doc: ComparedRuns) -> str:
     """What an engineer would say first."""
-    verdict, change = doc.verdict, moved(doc.ratios, {FAMILY.get(k, k) for k in doc.effects} == {"drive"})
+    verdict, change = doc.verdict, say.moved(doc.ratios, {FAMILY.get(k, k) for k in doc.effects} == {"drive"})
     size = f" ({change})" if change else ""
     if verdict == "none" and doc.rule.endswith(recordings.ONLY_VOLTS):
         return f"Same thrust per watt{size}; {doc.rule}."
     if verdict == "none":
         return f"No change beyond the difference between two set-ups{size or ' (drive only)'}."
     if verdict == "unknown":
-        return f"{something(_posterior(doc))}{size}, and no listed cause explains it."
+        return f"{say.something(_posterior(doc))}{size}, and no listed cause explains it."
     if verdict == "insufficient":
         return _open(doc, size)
     if doc.rule == REVERSED:
@@ -286,7 +269,7 @@ def headline(doc: ComparedRuns) -> str:
     if doc.effects == ("air_density",) and doc.rule.startswith(recordings.AS_RECORDED):
         return f"Nothing but the air changed, as recorded{size}; the coefficients agree."
     beside, sets = doc.rule.endswith(BESIDE), doc.sets or (doc.effects,)
-    return claimed(verdict, doc.probability or 0.0, sets, _ways(doc), partial(_title, doc), beside, change)
+    return say.claimed(verdict, doc.probability or 0.0, sets, _ways(doc), partial(_title, doc), beside, change)
 
 
 def _title(doc: ComparedRuns, name: str) -> str:
@@ -298,10 +281,10 @@ def _title(doc: ComparedRuns, name: str) -> str:
     return " and ".join(titled(i, own, doc.full_scale) for i, own in each.items())
 
 
-def _ways(doc: ComparedRuns) -> list[Way]:
+def _ways(doc: ComparedRuns) -> list[say.Way]:
     """What a class stands for, the likeliest first."""
     P = _posterior(doc)
-    return [Way(_title(doc, str(k)), P.get(k, 0.0)) for k in ways(doc.effects, P)]
+    return [say.Way(_title(doc, str(k)), P.get(k, 0.0)) for k in ways(doc.effects, P)]
 
 
 def _posterior(doc: ComparedRuns) -> dict[Explanation, float]:
@@ -320,7 +303,7 @@ def _open(doc: ComparedRuns, size: str) -> str:
         return f"These recordings cannot say whether anything changed{size}; two runs may differ by as much."
     if doc.rule == OTHER_STAND:
         return f"Something is wrong{size}: {doc.rule}."
-    return f"{something(_posterior(doc))}{size}, and these recordings do not show what."
+    return f"{say.something(_posterior(doc))}{size}, and these recordings do not show what."
 
 
 def _ends(r: Ratio, factor: float = 1.0) -> list[str]:
@@ -331,13 +314,13 @@ def _said(doc: ComparedRuns) -> list[str]:
     """Sentences on loads, cause, what speaks against it, and the next step with its command."""
     text, command = (doc.next_measurement.get(k) for k in ("text", "command"))
     told = doc.told if doc.diagnosis and doc.told else _causes(doc)
-    out = [*seen(doc.ratios, "B against A"), *_of_density(doc.density), *told, *_of_miscount(doc), *_of_drive(doc),
+    out = [*say.seen(doc.ratios, "B against A"), *_of_density(doc.density), *told, *_of_miscount(doc), *_of_drive(doc),
            *_of_files(doc), *([f"Next: {text}."] if text else [])]  # fmt: skip
     if command and "CASE" in command.split():
         out.append("  with a case of this rotor, or its label, the solver weighs the causes:")
     elif command and (checked := doc.next_measurement.get("checks")):
         out.append(f"  if {title_of(checked)} is ruled out:")
-    return [line for words in (*out, *([f"  {command}"] if command else [])) for line in wrapped(words)]
+    return [line for words in (*out, *([f"  {command}"] if command else [])) for line in say.wrapped(words)]
 
 
 def _of_files(doc: ComparedRuns) -> list[str]:
@@ -346,13 +329,13 @@ def _of_files(doc: ComparedRuns) -> list[str]:
     for note in doc.notes:
         if note.startswith(recordings.ERROR_IN[0]):
             where, kind, evidence = note.removeprefix(recordings.ERROR_IN[0]).split(": ", 2)
-            wrong.append(Wrong(where, kind, evidence))
+            wrong.append(say.Wrong(where, kind, evidence))
         elif note.startswith(recordings.ERROR_IN):
             warned.append(f"{note[0].upper()}{note[1:]}.")
     wrong = [w._replace(both=any(w.kind == v.kind and w.where != v.where for v in wrong)) for w in wrong]
     first = next(iter(doc.ranking), None)
     cause = {first.effect: first.parameters} if first and doc.effects[:1] == (first.effect,) else {}
-    return [*of_files(wrong, cause), *warned]
+    return [*say.of_files(wrong, cause), *warned]
 
 
 def _of_density(density: Densities) -> list[str]:
@@ -387,9 +370,9 @@ def _of_drive(doc: ComparedRuns) -> list[str]:
 def _causes(doc: ComparedRuns) -> list[str]:
     """What else it may be, or what is likeliest; the reason where there is one."""
     if doc.verdict == "class":
-        return others(_ways(doc)) if len(doc.sets) < 2 else []
+        return say.others(_ways(doc)) if len(doc.sets) < 2 else []
     if doc.verdict == "insufficient" and not doc.rule.endswith((IN_WIND, NOTHING_SHARED, NO_SPEED)):
-        return likeliest(_posterior(doc), lambda k: _title(doc, str(k)), NO_CHANGE)
+        return say.likeliest(_posterior(doc), lambda k: _title(doc, str(k)), say.NO_CHANGE)
     told = doc.rule.startswith((ON_ONE, *recordings.AS_RECORDED)) or doc.rule == REVERSED
     return [] if told or doc.verdict not in CLAIMS else [f"{doc.rule[0].upper()}{doc.rule[1:]}."]
 

@@ -3,30 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from bemt import __version__
 from bemt.base.tables import or_null, text_table
 from bemt.data.recordings.channels import AS_ELECTRICAL, AS_SHAFT
+from bemt.judge.compare import sentences as say
 from bemt.judge.compare.drive_laws import title_of
-from bemt.judge.compare.sentences import (
-    FAR_OFF,
-    NO_CHANGE,
-    Way,
-    Wrong,
-    claimed,
-    first_mend,
-    likeliest,
-    moved,
-    of_files,
-    others,
-    seen,
-    something,
-    verdict_line,
-    wrapped,
-)
 from bemt.judge.compare.sizes import in_words, of_largest, sized, titled
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import other_rotor
@@ -118,17 +103,11 @@ def told(d: Diagnosis) -> Told:
     against = [*_files(d), *_of_another_rotor(d), *_level_alone(d), *_reference_off(d), *_of_loads(d),
                *(f"{words[:1].upper()}{words[1:]}." for words in d.problem.no_check)]  # fmt: skip
     details = [*_signs(d), *_beyond(d), *(f"Model: {words}." for words in d.problem.validity), _gain(d)]
-    odd = first_mend(() if (change := _change(d)) is None else change.notes, d.said.verdict)
-    odd = odd.replace(f"{FAR_OFF}A", f"{FAR_OFF}the reference").replace(f"{FAR_OFF}B", f"{FAR_OFF}the recording")
-    return Told(
-        f"{odd} {headline(d)}".strip(),
-        [*_left_open(d), *_seen(d)],
-        _causes(d),
-        against,
-        details,
-        _next(d),
-        _not_tried(d),
-    )
+    odd = say.first_mend(() if (change := _change(d)) is None else change.notes, d.said.verdict)
+    for letter, which in (("A", "the reference"), ("B", "the recording")):
+        odd = odd.replace(f"{say.FAR_OFF}{letter}", f"{say.FAR_OFF}{which}")
+    first, shown = f"{odd} {headline(d)}".strip(), [*_left_open(d), *_seen(d)]
+    return Told(first, shown, _causes(d), against, details, _next(d), _not_tried(d))
 
 
 def explanation(d: Diagnosis) -> list[str]:
@@ -144,12 +123,10 @@ def _change(d: Diagnosis) -> RunChange | None:
 
 def _seen(d: Diagnosis) -> list[str]:
     """What was measured: the change from the reference, or where the recording is off the case."""
-    change, of_drive = _change(d), d.said.by == "drive"
-    words = (
-        [w for drive in {False, of_drive} for w in seen(change.ratios, "Against the reference", drive)]
-        if change
-        else []
-    )
+    words: list[str] = []
+    if change := _change(d):
+        words = say.seen(change.ratios, "Against the reference")
+        words += say.seen(change.ratios, "Against the reference", True) if d.said.by == "drive" else []
     if words or d.said.verdict == "none":
         return words
     return [(d.where if _is_claim(d) else bare(d.found)).sentence(d.words)]
@@ -181,7 +158,7 @@ def _causes(d: Diagnosis) -> list[str]:
         brackets = "; 90 % in brackets" if " to " in size else ""
         return [f"Size: {size}{brackets}."] if size and size not in headline(d) else []
     if said.verdict == "class":
-        return others(_ways(d)) if len(said.sets) < 2 else []
+        return say.others(_ways(d)) if len(said.sets) < 2 else []
     if said.verdict == "unknown":
         where, _, size = d.found.states[0].best_rival.partition(": ")
         return [f"Something smooth that is not in the library: it shows in {where}, by about {size[:-1]} %."]
@@ -189,7 +166,7 @@ def _causes(d: Diagnosis) -> list[str]:
         return []
     if not _shown(d) and other_rotor.foreign(problem):
         return [f"Most likely: {other_rotor.nearest_slips(problem)}."]
-    return likeliest(d.found.probability, lambda k: _both(d, k, k), NO_CHANGE if _shown(d) else _NOTHING)
+    return say.likeliest(d.found.probability, lambda k: _both(d, k), say.NO_CHANGE if _shown(d) else _NOTHING)
 
 
 def _shown(d: Diagnosis) -> bool:
@@ -261,17 +238,15 @@ def _files(d: Diagnosis) -> list[str]:
     """What the files contradict or lose."""
     problem = d.problem
     question, wrong, rest = other_rotor.finding(problem), [], []
-    kinds = [
-        {m[2] for f in p.record.findings if (m := _FINDING.fullmatch(f))} for p in problem.parts if p.record.reference
-    ]
-    for f in problem.findings:
-        if match := _FINDING.fullmatch(f):
-            wrong.append(Wrong(match[1], match[2], match[3], match[4], any(match[2] in k for k in kinds)))
+    known = [f for p in problem.parts if p.record.reference for f in p.record.findings]
+    shared, claim = {m[2] for m in map(_FINDING.fullmatch, known) if m}, d.said.verdict in CLAIMS
+    for f in (f for f in problem.findings if f not in known):
+        if m := _FINDING.fullmatch(f):
+            wrong.append(say.Wrong(m[1], m[2], m[3], "" if claim else m[4], m[2] in shared))
         elif f != question or not other_rotor.foreign(problem):
             rest.append(f"In the file: {f}.")
-    claim = d.said.verdict in CLAIMS
     cause = {i: d.parameters.get(i, {}) for i in d.said.leading} if claim else {}
-    found = [*of_files(wrong, cause), *rest]
+    found = [*say.of_files(wrong, cause), *rest]
     if left := found[_FINDINGS:]:
         found[_FINDINGS - 1 :] = [f"{found[_FINDINGS - 1]} And {len(left)} more; `import` shows all."]
     return [*found, *(f"In the file: {note}." for note in problem.notes if DROPPED in note)]
@@ -372,13 +347,13 @@ def headline(d: Diagnosis) -> str:
     if said.verdict in CLAIMS:
         sets, against = said.sets or (said.effects,), f"{change} against the reference" if change else ""
         against += _in_both(d)
-        return claimed(said.verdict, said.probability, sets, _ways(d), lambda i: _title(d, i), said.beside, against)
+        return say.claimed(said.verdict, said.probability, sets, _ways(d), lambda i: _title(d, i), said.beside, against)
     if said.verdict == "insufficient" and (other_rotor.foreign(d.problem) or other_rotor.doubted(d.problem, said)):
         return f"These are not the loads of this case ({_off(d)}): check diameter, blades, units and speed first."
     file, wrong, _ = other_rotor.contradiction(d.problem)
     if file and said.verdict == "insufficient" and not _guess(d):  # a duct or a wall may be why it looks impossible
         return f"{file} cannot be right: {wrong}. Mend that before any cause is looked for."
-    unknown, start = said.verdict == "unknown", something(d.found.probability)
+    unknown, start = said.verdict == "unknown", say.something(d.found.probability)
     if not change:
         why = "and no effect in the library explains it" if unknown else "but these readings do not show why"
         return f"Recording and model differ ({_off(d)}), {why}."
@@ -393,7 +368,7 @@ def headline(d: Diagnosis) -> str:
 def _moved(d: Diagnosis) -> str:
     """What changed from the reference, by how much; "" where that was not compared."""
     change = _change(d)
-    return "" if change is None else moved(change.ratios, d.said.by == "drive") or moved(change.ratios)
+    return "" if change is None else say.moved(change.ratios, d.said.by == "drive") or say.moved(change.ratios)
 
 
 def _agreement(d: Diagnosis) -> str:
@@ -408,17 +383,17 @@ def _agreement(d: Diagnosis) -> str:
     return "Recording and model agree within noise, calibration and the uncertainty of the model."
 
 
-def _ways(d: Diagnosis) -> list[Way]:
+def _ways(d: Diagnosis) -> list[say.Way]:
     """What a class stands for, the likeliest first."""
     P = d.found.probability
-    return [Way(_both(d, k, k), P.get(k, 0.0)) for k in ways(d.said.effects, sorted(P, key=lambda k: -P[k]))]
+    return [say.Way(_both(d, k), P.get(k, 0.0)) for k in ways(d.said.effects, sorted(P, key=lambda k: -P[k]))]
 
 
-def _both(d: Diagnosis, what: Iterable[str], alone: Explanation) -> str:
+def _both(d: Diagnosis, what: Explanation) -> str:
     """Titles of the effects that an explanation has at work together, with their sizes."""
-    found = d.parameters if alone == d.decision.leading else {}
-    if not found and alone.ids and all(i in d.found.spans for i in alone):
-        found = fitting.intervals(d.found, alone)
+    found = d.parameters if what == d.decision.leading else {}
+    if not found and what.ids and all(i in d.found.spans for i in what):
+        found = fitting.intervals(d.found, what)
     return " and ".join(titled(i, found.get(i, {}), full_scale(d)) for i in what)
 
 
@@ -445,30 +420,24 @@ def _guess(d: Diagnosis) -> bool:
 def text(d: Diagnosis, details: bool = False, lead: str = "") -> str:
     """The answer in twelve lines after a ``lead``; with ``details`` all sentences, and the tables behind them."""
     said = told(d)
-    out = [*wrapped(f"{lead} {said.first}".strip(), "", ""), verdict_line(d.said.verdict, d.said.effects)]
+    out = [*say.wrapped(f"{lead} {said.first}".strip(), "", ""), say.verdict_line(d.said.verdict, d.said.effects)]
     body = [*said.seen, *said.causes, *said.against]
     if not details:
-        body = _few(
-            body,
-            [*_left_open(d), *said.causes],
-            _LINES - len(out) - len([line for w in said.step for line in wrapped(w)]),
-        )
+        step = sum(len(say.wrapped(words)) for words in said.step)
+        body = _few(body, [*_left_open(d), *said.causes], _LINES - len(out) - step)
     lines = [*body, *(said.details if details else []), *said.step]
-    out += [line for words in lines for line in wrapped(words)]
+    out += [line for words in lines for line in say.wrapped(words)]
     if details:
-        out += [
-            *_tables(d),
-            *(f"  note: {note}" for note in d.problem.notes),
-            *(x for w in said.last for x in wrapped(w)),
-        ]
+        out += [*_tables(d), *(f"  note: {note}" for note in d.problem.notes)]
+        out += [line for words in said.last for line in say.wrapped(words)]
     return "\n".join(out)
 
 
 def _few(body: list[str], sure: list[str], most: int) -> list[str]:
     """Sentences that fit into ``most`` lines, some of them in any case."""
-    left, kept = most - sum(len(wrapped(words)) for words in sure), []
+    left, kept = most - sum(len(say.wrapped(words)) for words in sure), []
     for words in body:
-        lines = 0 if words in sure else len(wrapped(words))
+        lines = 0 if words in sure else len(say.wrapped(words))
         if lines <= left or words in sure:
             kept.append(words)
             left -= lines
