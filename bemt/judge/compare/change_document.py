@@ -122,9 +122,9 @@ def _quickest_checks(change: RunChange, asked: Invocation) -> tuple[str, str]:
     firsts: dict[str, str] = {}
     causes = [k for k in said.ranked if k.ids]
     if causes and next(iter(said.ranked)) != NONE:
-        # the likeliest first, also what anybody would see; beside that the best of what is nearly as likely
+        # what is nearly as likely as the likeliest goes first, and before it that one where anybody would see it
         near = {i for k in causes if said.ranked[k] >= _NEARLY * said.ranked[causes[0]] for i in k}
-        order = [*causes[0], *(k for k in order if k in near), *order]
+        order = [*(i for i in causes[0] if i not in order), *(k for k in order if k in near), *order]
     for cause in [k for k in order if k in members or said.verdict != "class"] or members:
         firsts.setdefault(FAMILY.get(cause, cause), check_of(cause) if cause else _REPEAT)
     told = [*filter(None, firsts.values())][:_STEPS] or [_REPEAT]

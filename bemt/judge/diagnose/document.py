@@ -266,8 +266,10 @@ def _reference_off(d: Diagnosis) -> list[str]:
     if all(abs(v) <= LEVEL for v in stated.values()):
         return []
     off = ", ".join(f"{d.words[c]} {share(v)}" for c, v in stated.items())
-    return [f"The case is not this rotor (reference: {off}); the blade was fitted to the reference, so the comparison "
-            "holds."]  # fmt: skip
+    what = (
+        "The case is not this rotor (reference:" if other_rotor.unlike(stated) else "The reference is off the case (by"
+    )
+    return [f"{what} {off}); the blade was fitted to the reference, so the comparison holds."]
 
 
 def _level(d: Diagnosis) -> str:

@@ -7,7 +7,7 @@ whose physics was left out: that question comes before the physics, with the lik
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -113,6 +113,11 @@ def foreign(problem: Problem) -> bool:
 
 def _suspicious(found: dict[str, float]) -> bool:
     return any(not 1.0 / FACTOR < abs(found[c]) < FACTOR for c in CHANNELS[:2] if c in found)
+
+
+def unlike(off: Mapping[str, float]) -> bool:
+    """Whether loads, over those of the case less 1, are farther off than those of the right rotor are."""
+    return any(v <= -1.0 or abs(math.log1p(v)) > 2.0 * _OFF for v in off.values())
 
 
 def suspects(problem: Problem) -> list[Suspect]:
