@@ -329,7 +329,7 @@ def _of_files(doc: ComparedRuns) -> list[str]:
     for note in doc.notes:
         if note.startswith(recordings.ERROR_IN[0]):
             where, kind, evidence = note.removeprefix(recordings.ERROR_IN[0]).split(": ", 2)
-            wrong.append(say.Wrong(where, kind, evidence))
+            wrong.append(say.Wrong(where, kind, evidence.removeprefix("thrust_N: ").removeprefix("torque_Nm: ")))
         elif note.startswith(recordings.ERROR_IN):
             warned.append(f"{note[0].upper()}{note[1:]}.")
     wrong = [w._replace(both=any(w.kind == v.kind and w.where != v.where for v in wrong)) for w in wrong]
@@ -359,8 +359,8 @@ def _of_miscount(doc: ComparedRuns) -> list[str]:
 def _of_drive(doc: ComparedRuns) -> list[str]:
     """What the drive says beside the answer."""
     drive = doc.subsystems.get("drive")
-    if drive and drive.effects and drive.effects != doc.effects:
-        return [f"Drive: {drive.verdict}: {', '.join(title_of(k) for k in drive.effects)}."]
+    if drive and not set(drive.effects) <= {*doc.effects}:
+        return [f"Drive: {', '.join(map(title_of, drive.effects))}."]
     if drive and doc.verdict != "none" and drive.verdict == "none":
         moved = any(r.kind in OVER_COMMAND and not r.low95 < 1.0 < r.high95 for r in doc.ratios.values())
         return [f"Drive: no change beyond {'what load, voltage or a miscount explains' if moved else 'scatter'}."]
@@ -370,7 +370,7 @@ def _of_drive(doc: ComparedRuns) -> list[str]:
 def _causes(doc: ComparedRuns) -> list[str]:
     """What else it may be, or what is likeliest; the reason where there is one."""
     if doc.verdict == "class":
-        return say.others(_ways(doc)) if len(doc.sets) < 2 else []
+        return say.others(_ways(doc), doc.sets, partial(_title, doc), _posterior(doc))
     if doc.verdict == "insufficient" and not doc.rule.endswith((IN_WIND, NOTHING_SHARED, NO_SPEED)):
         return say.likeliest(_posterior(doc), lambda k: _title(doc, str(k)), say.NO_CHANGE)
     told = doc.rule.startswith((ON_ONE, *recordings.AS_RECORDED)) or doc.rule == REVERSED

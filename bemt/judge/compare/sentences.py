@@ -78,7 +78,7 @@ def claimed(
     >>> claimed("class", 0.9, (("gain", "zero"),), both, str, False, "thrust +5.0 %")
     'Most likely gain, probability 0.60; thrust +5.0 %.'
     >>> claimed("class", 0.9, (("gain",), ("zero", "duct")), both, str, False, "")
-    'Two causes, probability 0.90: gain and one of (zero / duct).'
+    'Two causes, probability 0.90: gain and (zero or duct).'
     """
     if verdict != "class":
         where = " in the stand, not the air" if verdict == "sensor" else ""
@@ -87,8 +87,7 @@ def claimed(
     elif beside:
         told = f"Cause found: {title(sets[0][0])}; possibly also {' or '.join(map(title, sets[1]))}"
     elif len(sets) > 1:
-        each = [" / ".join(map(title, one)) for one in sets]
-        each = [f"one of ({words})" if " / " in words else words for words in each]
+        each = [_either(one, title) for one in sets]
         told = f"Two causes, probability {odds(probability)}: {' and '.join(each)}"
     elif ways[0].probability >= _LIKELIER:
         told = f"Most likely {ways[0].title}, probability {odds(ways[0].probability)}"
@@ -96,6 +95,13 @@ def claimed(
         alike = f"one of {len(ways)} causes that these readings cannot tell apart, likeliest {ways[0]}"
         told, change = f"{change}: {alike}" if change else alike, ""
     return f"{told[0].upper()}{told[1:]}{f'; {change}' if change else ''}."
+
+
+def _either(one: Sequence[str], title: Callable[[str], str]) -> str:
+    """The first of a set, and how many others it may be instead."""
+    if len(one) == 1:
+        return title(one[0])
+    return f"({title(one[0])} or {title(one[1]) if len(one) == 2 else f'one of {len(one) - 1} others'})"
 
 
 def something(P: Mapping[Explanation, float]) -> str:
@@ -109,9 +115,14 @@ def first_mend(notes: Sequence[str], verdict: str) -> str:
     return f"First look at {'; '.join(found)}." if found else ""
 
 
-def others(ways: Sequence[Way]) -> list[str]:
-    """What else a class may be, each once."""
-    return [f"It may also be: {'; '.join(map(str, ways[1:]))}."] if len(ways) > 1 else []
+def others(
+    ways: Sequence[Way], sets: Sequence[Sequence[str]], title: Callable[[str], str], P: Mapping[Explanation, float]
+) -> list[str]:
+    """What else a class may be, each once; of two causes what either may be instead of the one that was said."""
+    if len(sets) < 2:
+        return [f"It may also be: {'; '.join(map(str, ways[1:]))}."] if len(ways) > 1 else []
+    each = {title(one[0]): [Way(title(i), P.get(Explanation.of(i), 0.0)) for i in one[1:]] for one in sets}
+    return [f"In place of {first}: {'; '.join(map(str, rest))}." for first, rest in each.items() if len(rest) > 1]
 
 
 def likeliest(P: Mapping[Explanation, float], title: Callable[[Explanation], str], nothing: str) -> list[str]:
@@ -226,7 +237,7 @@ def of_files(found: Sequence[Wrong], cause: Mapping[str, Found]) -> list[str]:
         if wrong.both:
             shared.setdefault(wrong.kind, f"In both files, and so no change: {wrong.evidence}.")
         elif _explains(cause, wrong.evidence):
-            support.append(f"It explains what cannot be: {wrong.evidence}.")
+            support.append(f"It explains what cannot be: {'; '.join(wrong.evidence.split('; ')[:2])}.")
         else:
             rest.append(f"In {wrong.where}: {'; '.join(filter(None, (wrong.evidence, wrong.correction)))}.")
     return [*support[:1], *rest, *shared.values()]

@@ -158,7 +158,7 @@ def _causes(d: Diagnosis) -> list[str]:
         brackets = "; 90 % in brackets" if " to " in size else ""
         return [f"Size: {size}{brackets}."] if size and size not in headline(d) else []
     if said.verdict == "class":
-        return say.others(_ways(d)) if len(said.sets) < 2 else []
+        return say.others(_ways(d), said.sets, lambda i: _title(d, i), d.found.probability)
     if said.verdict == "unknown":
         where, _, size = d.found.states[0].best_rival.partition(": ")
         return [f"Something smooth that is not in the library: it shows in {where}, by about {size[:-1]} %."]
