@@ -92,7 +92,7 @@ def of_largest(name: str, parameter: str, value: float, largest: Mapping[str, fl
 
 def _is_share(p: Parameter) -> bool:
     """Whether a number without a unit is a share of something."""
-    return p.unit == "1" and p.off == 0.0 and max(abs(p.low), abs(p.high)) < 1.0
+    return p.unit == "1" and p.off == 0.0 and max(abs(p.low), abs(p.high)) <= 1.0
 
 
 def sized(p: Parameter, value: float, form: str = ".3g") -> str:
