@@ -356,9 +356,9 @@ def test_a_reference_that_the_run_agrees_with_is_the_first_word() -> None:
     made = record.from_series(Dataset("bench", "log", values, dict(series.u)), case())
     answer = chain.diagnose([made, replace(made, reference=True)], [case()])
     first = document.headline(answer)
-    assert first.startswith("No cause above 1 %: the recording differs from the reference")
-    assert "no more than runs do" in first
-    assert "thrust by" in first and "torque by" in first, "the figure stands beside it"
+    assert first.startswith("No change beyond what two runs differ by (thrust ") and "no cause above 1 %" in first
+    figure = r"thrust [+-]0\.\d % and torque [+-]0\.\d % against the reference"
+    assert re.search(figure, first), "the figure stands beside it"
 
 
 def test_a_file_that_cannot_be_right_is_the_first_word(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -397,19 +397,20 @@ def test_without_an_explanation_the_first_sentence_is_what_the_recording_shows(c
     made = record.from_series(Dataset("bench", "log", values, dict(series.u)), case())
     answer = chain.diagnose([made], [case()])
     assert answer.decision.verdict in ("unknown", "insufficient")
-    first, second = [line for line in document.explanation(answer) if not line.startswith("Model: ")][1:3]
+    said = document.told(answer)
+    (first,), beyond = said.seen, [line for line in said.details if line.startswith("Beyond the uncertainty")]
     word = {"thrust_N": "Thrust", "torque_Nm": "Torque"}[channel]
     told = re.match(
-        rf"{word} is high by (\d+\.\d) .*%, at tip Mach number (\d\.\d+) to (\d\.\d+) \((\d+) to (\d+) rev/min\)\.$",
+        rf"{word} is high by (\d+\.\d) .*%, at (\d+) to (\d+) rev/min\.$",
         first,
     )
     assert told is not None, first
-    low, high, slow, fast = map(float, told.groups()[1:])
-    assert fast == pytest.approx(np.max(series["rpm"]), rel=0.01) and fast / slow == pytest.approx(high / low, rel=0.05)
+    slow, fast = map(float, told.groups()[1:])
+    assert fast == pytest.approx(np.max(series["rpm"]), rel=0.01)
+    assert slow == pytest.approx(np.min(series["rpm"][series["rpm"] > 13000.0]), rel=0.15)
     assert float(told[1]) == pytest.approx(15.0, abs=1.5), "a share of the load itself, as the headline says it"
-    assert (float(told[2]), float(told[3])) == pytest.approx((0.41, 0.69), abs=0.1)
     where = answer.where
-    assert second.startswith("Beyond the uncertainty") == ((where.channel, where.size > 0) != (channel, True))
+    assert bool(beyond) == ((where.channel, where.size > 0) != (channel, True))
 
 
 def test_a_load_of_many_times_the_cases_is_a_factor_of_what_the_case_gives() -> None:
@@ -585,9 +586,8 @@ def test_findings_of_several_files_name_their_file_first(tmp_path: Path, capsys:
     assert odd.startswith("2.csv: error: thrust_unit (thrust_N): ") and "lbf taken for N" in odd
     assert "2.csv: warning: sign_flipped (thrust_N): " in " ".join(own)
     assert all(f.startswith("2.csv: ") for f in own)
-    assert answer["explanation"].startswith(
-        f"{answer['headline']} Before any physics: {odd} Before any physics: {own[0]} "
-    )
+    evidence = odd.partition("(thrust_N): ")[2].partition(". Correction: ")[0]
+    assert f" In 2.csv: {evidence}" in answer["explanation"], answer["explanation"]
 
 
 def test_real_recordings_of_one_propeller_have_one_unit(shared_data: Path, tmp_path: Path) -> None:
@@ -634,7 +634,7 @@ def test_the_headline_claims_what_the_verdict_claims_and_a_study_of_cfd_ends_in_
     claim = replace(found.decision, verdict="class", effects=("thrust_gain", "pitch_offset"))
     silent = replace(found, decision=claim, said=replace(claim, verdict="insufficient", effects=()))
     assert "do not show why" in document.headline(silent)
-    assert document.headline(replace(silent, said=claim)).startswith("The cause is")
+    assert re.match("Most likely|One of 2 causes", document.headline(replace(silent, said=claim)))
     assert "finer grid" in suggest.suggest(silent.found, []).text
     assert "reference" not in silent.next.text + str(silent.next.otherwise)
 

@@ -41,8 +41,8 @@ def plus(column: str, share: float) -> Callable[[Rows], Rows]:
 FAULTS: dict[str, tuple[str, Callable[[Rows], Rows]]] = {
     "none": ("", lambda rows: rows), "6 pole pairs for 7": ("rpm_scale", times("rpm", 7.0 / 6.0)),
     "electrical speed": ("rpm_scale", times("rpm", 2.0)), "thrust cell +10 %": ("thrust_gain", times("th", 1.1)),
-    "torque cell -12 %": ("torque_gain", times("tq", 0.88)), "zero of the torque cell": ("torque_zero", plus("tq", 0.05)),
-    "torque in gf mm": ("unit_slip", times("tq", 10.0)),
+    "torque cell -12 %": ("torque_gain", times("tq", 0.88)), "torque in gf mm": ("unit_slip", times("tq", 10.0)),
+    "zero of the torque cell": ("torque_zero", plus("tq", 0.05)),
 }  # fmt: skip
 
 
@@ -60,8 +60,8 @@ def answers(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> dict
                 table = csv.DictWriter(file, list(rows[0]))
                 table.writeheader()
                 table.writerows(read(rows))
-            both = {"compare": bemt.compare(first, made), "diagnose": bemt.diagnose(made, case=label, reference=[first])}
-            for door, answer in both.items():
+            with_label = bemt.diagnose(made, case=label, reference=[first])
+            for door, answer in {"compare": bemt.compare(first, made), "diagnose": with_label}.items():
                 said = answer.to_dict()
                 out[door, name, fault] = set(said["effects"]) if said["verdict"] in CLAIMS else None
     return out

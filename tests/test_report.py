@@ -262,7 +262,7 @@ def test_a_diagnosis_is_shown_with_its_figures_and_none_from_outside(made: tuple
     page = book_html(book)
     assert_harmless(page)
     assert "Diagnosis: what the model leaves out" in page and "Weigh the duct alone." in page
-    assert "residual map" in page and "duct = ground_effect" in page
+    assert "residual map" in page and "duct thrust or wall behind the propeller" in page
 
 
 def test_a_parameter_of_another_form_of_the_law_is_not_shown(made: tuple[Book, Path], tmp_path: Path) -> None:

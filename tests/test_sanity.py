@@ -668,7 +668,7 @@ def test_loads_of_two_rows_that_were_exchanged_are_left_out_and_their_lines_name
     for channel in ("thrust_N", "torque_Nm"):
         values[channel][[3, 6]] = values[channel][[6, 3]]
     found = said(check(recording(values)), "misread")
-    assert {(f.channel, f.rows) for f in found} == {(c, (k,)) for c in ("thrust_N", "torque_Nm") for k in (3, 6)}
+    assert {f.channel: f.rows for f in found} == {"thrust_N": (3, 6), "torque_Nm": (3, 6)}
     assert all("loads of lines 5 and 8 exchanged" in f.correction for f in found)
     values["thrust_N"][1] *= 3.0  # a third is no exchange, and too many of nine to say who is right
     assert not said(check(recording(values)), "misread", "thrust_N")

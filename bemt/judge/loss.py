@@ -35,6 +35,10 @@ class Costs:
 COSTS = Costs()
 SPREAD = "the spread of rotors and runs alone is likeliest"
 """Start of the reason where "none" is likeliest, and not sure."""
+BESIDE = "whether another is, too, is left open"
+"""End of the reason where one of two causes is sure."""
+ON_ONE = "nearly all of the probability is on "
+"""Start of the reason of a name that has no better one."""
 SECOND = 0.1
 """Where loads and drive are measured apart, each with a prior of its own: odds that one of them changed over those,
 where the other did; few pairs are of both (declared) [1]."""
@@ -122,7 +126,7 @@ def decide(P: Mapping[Explanation, float], costs: Costs = COSTS, still: frozense
     if verdict == "named":
         what, known = Explanation.of(*said), effects.catalogue()
         stand = all(i in known and known[i].kind == "stand" for i in said)
-        why = "nearly all of the probability is on " + ("it" if len(said) == 1 else "both")
+        why = ON_ONE + ("it" if len(said) == 1 else "both")
         return replace(decision, verdict="sensor" if stand else verdict, leading=what, probability=P.get(what, 0.0),
                        why=why, sets=tuple((i,) for i in said))  # fmt: skip
     if verdict == "class":
@@ -173,7 +177,7 @@ def _of_class(decision: Decision, inside: Mapping[Explanation, float]) -> Decisi
     beside = len(sets) > 1 and alone > _ALONE * total
     why = "these readings do not tell them apart"
     if len(sets) > 1:
-        why = f"{surest} is present; whether another is, too, is left open" if beside else "two causes are present"
+        why = f"{surest} is present; {BESIDE}" if beside else "two causes are present"
     return replace(decision, probability=total, why=why, sets=sets, beside=beside)
 
 

@@ -143,12 +143,14 @@ def misread(facts: Facts) -> Iterator[Finding]:
         odd, why = times != 1.0, "mistyped, or a loose contact? Measure it again"
         if np.count_nonzero(odd) == 2 and abs(float(np.log(times[odd]).sum())) < 2.0 * LONE_SD:
             why = f"were the loads of lines {' and '.join(str(facts.lines[i]) for i in rows[odd])} exchanged? Look"
+        told = []
         for i, off in zip(rows[odd].tolist(), times[odd].tolist(), strict=True):
             at = f"{rpm[i]:.0f} rev/min"
             at += "" if flow is None else f" and J {flow[i]:.2g}" if V is None else f" and {V[i]:.3g} m/s"
-            text = f"{v[i]:.4g} in line {facts.lines[i]} is {off:.3g} times what the others give at {at}"
+            told.append(f"{v[i]:.4g} in line {facts.lines[i]} is {off:.3g} times what the others give at {at}")
+        if told:
             fix = f"{why}; `diagnose` and `compare` leave it out"
-            yield Finding("misread", facts.named(name), text, fix, (i,), "warning")
+            yield Finding("misread", facts.named(name), ", and ".join(told), fix, tuple(rows[odd].tolist()), "warning")
 
 
 @check_for("stuck")

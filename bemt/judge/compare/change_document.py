@@ -3,27 +3,28 @@
 from __future__ import annotations
 
 import math
-import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import field
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from bemt import __version__
 from bemt.base.document import Documented
-from bemt.base.tables import number_text, or_null, text_table
+from bemt.base.tables import or_null, text_table
 from bemt.base.unit_errors import speed_ratios
 from bemt.judge.compare import recordings
-from bemt.judge.compare.drive_laws import FAMILY, FAMILY_WORD, Judgement, check_of, title_of
+from bemt.judge.compare import sentences as say
+from bemt.judge.compare.drive_laws import FAMILY, Judgement, check_of, title_of
 from bemt.judge.compare.matched import LOADS, OVER_COMMAND, WITHOUT_SPEED
 from bemt.judge.compare.recordings import IN_WIND, NO_SPEED, NOTHING_SHARED, OTHER_STAND, REVERSED, RunChange
 from bemt.judge.compare.selection import Invocation
 from bemt.judge.compare.sizes import titled
 from bemt.judge.compare.smooth_change import Ratio
-from bemt.judge.explanation import NONE, UNKNOWN, Explanation, Size
-from bemt.judge.loss import SPREAD, checks_by_worth, minutes, ways
+from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation, Size
+from bemt.judge.loss import BESIDE, CLAIMS, ON_ONE, SPREAD, checks_by_worth, minutes, ways
 
 AIR_OF_BOTH = "--air-a TEMPERATURE,PRESSURE --air-b TEMPERATURE,PRESSURE"
 ONE_SETUP = "compute both with one set-up: before that no physics is named"
@@ -41,7 +42,7 @@ _ONE_BATTERY = "to compare at one voltage, repeat B with the battery or supply o
 # Scatter of readings at one speed, share, that no stand has: something else changes from reading to reading.
 _RESTLESS = 0.10
 _REPEAT = "repeat the run of A and compare it with A: so much two runs differ by without a cause"
-_STEPS = 2  # that are offered at once
+_STEPS, _NEARLY = 2, 0.5  # that are offered at once; share of the largest probability that is nearly as much
 
 
 def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
@@ -96,7 +97,8 @@ def _lacking(change: RunChange, asked: Invocation) -> tuple[str, str] | None:
             where = f"at the speeds of A, {low:.0f} to {high:.0f} rev/min"
         return f"run B again {where}, and at its airspeeds", asked.command(b="B_AGAIN.csv")
     if change.without_speed:
-        text = "record the speed in both runs, headed rpm: at equal speed causes scale apart"
+        scale = "hang a known weight on the scale, or run both propellers on one motor"
+        text = f"record the speed in both runs, in a column rpm; without a counter, {scale}"
         return text, asked.command(a="A_WITH_RPM.csv", b="B_WITH_RPM.csv")
     if said.verdict in ("insufficient", "unknown") and (letter := _unrepeatable(change)):
         columns = (change.a if letter == "a" else change.b).conditions
@@ -119,12 +121,17 @@ def _quickest_checks(change: RunChange, asked: Invocation) -> tuple[str, str, st
     members = [k for k in said.effects if check_of(k)]
     order = checks_by_worth(said.ranked, minutes("reference", len(change.a.points)))
     firsts: dict[str, str] = {}
+    causes = [k for k in said.ranked if k.ids]
+    if causes and next(iter(said.ranked)) != NONE:
+        # what is nearly as likely as the likeliest goes first, and before it that one where anybody would see it
+        near = {i for k in causes if said.ranked[k] >= _NEARLY * said.ranked[causes[0]] for i in k}
+        order = [*(i for i in causes[0] if i not in order), *(k for k in order if k in near), *order]
     for cause in [k for k in order if k in members or said.verdict != "class"] or members:
         firsts.setdefault(FAMILY.get(cause, cause), cause)
-    causes = [*firsts.values()][:_STEPS] or [""]
+    told = [k for k in firsts.values() if not k or check_of(k)][:_STEPS] or [""]
     again = {"b": "A_AGAIN.csv", "rows_b": asked.rows_a, "air_b": asked.air_a}
-    command = asked.without(causes[0]) if causes[0] else asked.command(**again)
-    return "; or ".join(check_of(k) if k else _REPEAT for k in causes), command, causes[0]
+    command = asked.without(told[0]) if told[0] else asked.command(**again)
+    return "; or ".join(check_of(k) if k else _REPEAT for k in told), command, told[0]
 
 
 def _unrepeatable(change: RunChange) -> str:
@@ -210,69 +217,28 @@ def document(change: RunChange) -> ComparedRuns:
 
 def _ranking(said: Judgement) -> tuple[RankedCause, ...]:
     first = list(said.ranked.items())[:12]
-    return tuple(RankedCause(str(k), p, said.parameters.get(str(k), {})) for k, p in first)
+    return tuple(RankedCause(str(k), p, said.parameters.get(str(k), said.sizes.get(k, {}))) for k, p in first)
 
 
-WORD = {
-    "thrust_N": "thrust", "torque_Nm": "torque", "power_W": "shaft power", "CT": "CT", "CP": "CP", "CQ": "CQ",
-    "electrical_power_W": "electrical power", "rpm": "speed at equal command",
-    "voltage_V": "voltage at equal command",
-}  # fmt: skip
 # Runs at nearly one speed say nothing of a change over it: error per doubling from which it is not shown [1].
 _NO_SLOPE = 1.0
 _ROWS, _NOTES = 8, 4
-_PULSE = 0.01  # a command below is a pulse width [s], above a throttle [1]
-# Families of causes, less one, from which a headline says the change first.
-_MANY = 2
-# Probability from which a cause is said as a guess.
-_GUESS = 0.1
-_LEAST = 0.01  # probability that is told with two digits
-_NO_CAUSE = ("none", "unknown", "doubt")
-
-
-def _shares(*values: float) -> list[str]:
-    """Changes in one notation: percent, or factors where one of them is far from 1.
-
-    >>> _shares(2.09, 1.66, 2.63), _shares(1.0, 0.9)
-    (['x2.09', 'x1.66', 'x2.63'], ['+0.0%', '-10.0%'])
-    """
-    near = all(0.4 < x < 2.5 for x in values)
-    return [f"{x - 1.0:+.1%}" if near else f"x{number_text(x, 3)}" for x in values]
-
-
-def _intervals(channels: Sequence[Ratio]) -> list[list[str]]:
-    """Change of each channel as measured and the ends of its 95 % interval, all in one notation."""
-    said = _shares(*(k * r.density_ratio for r in channels for k in (r.ratio, r.low95, r.high95)))
-    return [said[i : i + 3] for i in range(0, len(said), 3)]
-
-
-def _range(r: Ratio) -> str:
-    low, high = r.range
-    if r.kind == "at_power":
-        return f"{math.exp(low):.0f} to {math.exp(high):.0f} W"
-    if r.kind in OVER_COMMAND:
-        return f"{1e6 * low:.0f} to {1e6 * high:.0f} µs" if high < _PULSE else f"{low:.0%} to {high:.0%}"
-    if high - low < 1e-9:
-        return "advance ratio {:.2f} to {:.2f}".format(*r.advance_range)
-    return f"{math.exp(low):.0f} to {math.exp(high):.0f} rev/min"
+_GUESS = 0.1  # probability from which a cause is likely
 
 
 def text(doc: ComparedRuns, details: bool = False) -> str:
     """Lines of a comparison."""
-    lines = textwrap.wrap(headline(doc), 110)
-    lines += [f"verdict: {doc.verdict}" + (f" {', '.join(doc.effects)}" if doc.effects else "")]
-    errors = [n for n in doc.notes if n.startswith(recordings.ERROR_IN)]
-    lines += [textwrap.fill(n, 110, initial_indent="  ", subsequent_indent="    ") for n in errors]
-    lines += _said(doc)
+    lines = say.wrapped(headline(doc), "", "")
+    lines += [say.verdict_line(doc.verdict, doc.effects), *_said(doc)]
     rows = []
     for channel, r in doc.ratios.items():
         raw = r.ratio * r.density_ratio
         slope = "-"
         over_speed = r.kind not in (*OVER_COMMAND, *WITHOUT_SPEED)
         if over_speed and r.slope is not None and r.slope_error is not None and r.slope_error < _NO_SLOPE:
-            slope = f"{r.slope:+.1%} +- {r.slope_error:.1%}"
-        more = [slope, f"{r.scatter:.1%}", "{}, {}".format(*r.points)]
-        rows.append([_at(WORD.get(channel, channel), r), f"{raw:.4f}", *_ends(r, r.density_ratio), *more])
+            slope = f"{100.0 * r.slope:+.1f} ± {100.0 * r.slope_error:.1f} %"
+        more = [slope, f"{100.0 * r.scatter:.1f} %", "{}, {}".format(*r.points)]
+        rows.append([say.of_what(channel, r), f"{raw:.4f}", *_ends(r, r.density_ratio), *more])
         if abs(r.density_ratio - 1.0) > 1e-6:
             coefficient = "CT" if channel == "thrust_N" else "CP"
             rows.append([f"  {coefficient} (corrected for density)", f"{r.ratio:.4f}", *_ends(r), "", "", ""])
@@ -280,8 +246,8 @@ def text(doc: ComparedRuns, details: bool = False) -> str:
     lines += ["", text_table(header, rows, left=(0,), indent="  ")]
     if details:
         lines += _tables(doc)
-    lines += [f"  assumed: {a}" for a in doc.assumed]
-    notes = [n for n in doc.notes if n not in errors]
+    lines += [line for a in doc.assumed for line in say.wrapped(f"assumed: {a}")]
+    notes = [n for n in doc.notes if not n.startswith(recordings.ERROR_IN)]
     notes = notes if details else [n for n in notes if not n.startswith(("A: ", "B: "))][:_NOTES]
     lines += [f"  note: {n}" for n in notes]
     return "\n".join(lines)
@@ -289,74 +255,56 @@ def text(doc: ComparedRuns, details: bool = False) -> str:
 
 def headline(doc: ComparedRuns) -> str:
     """What an engineer would say first."""
-    effects, verdict = list(doc.effects), doc.verdict
-    moved = _moved(doc)
+    verdict, change = doc.verdict, say.moved(doc.ratios, {FAMILY.get(k, k) for k in doc.effects} == {"drive"})
+    size = f" ({change})" if change else ""
     if verdict == "none" and doc.rule.endswith(recordings.ONLY_VOLTS):
-        return f"Same thrust per watt ({moved}); {doc.rule}."
+        return f"Same thrust per watt{size}; {doc.rule}."
     if verdict == "none":
-        return f"No change beyond the difference between two set-ups ({moved or 'drive only'})."
+        return f"No change beyond the difference between two set-ups{size or ' (drive only)'}."
     if verdict == "unknown":
-        return "Something changed" + (f" ({moved})" if moved else "") + ", and no listed cause explains it."
+        return f"{say.something(_posterior(doc))}{size}, and no listed cause explains it."
     if verdict == "insufficient":
-        return _open(doc, f" ({moved})" if moved else "")
+        return _open(doc, size)
     if doc.rule == REVERSED:
-        return f"{REVERSED[0].upper()}{REVERSED[1:]} ({moved}): the cell is reversed, or the rotor turns the other way."
-    if effects == ["air_density"] and doc.rule.startswith(recordings.AS_RECORDED):
-        return f"Nothing but the air changed, as recorded ({moved}); the coefficients agree."
-    if len(effects) == 1:
-        lead = "The stand, not the rotor" if verdict == "sensor" else "What changed"
-        return f"{lead}: {_title(doc, effects[0])} ({moved or 'drive alone'})."
-    several = families(effects, doc.ranking)
-    if several.count(", or ") >= _MANY:  # what was measured first, where little is known of the cause
-        return f"{moved[0].upper()}{moved[1:]}: {several}." if moved else f"The drive: {several}."
-    return f"{several[0].upper()}{several[1:]} ({moved or 'drive alone'})."
+        return f"{REVERSED[0].upper()}{REVERSED[1:]}{size}: the cell is reversed, or the rotor turns the other way."
+    if doc.effects == ("air_density",) and doc.rule.startswith(recordings.AS_RECORDED):
+        return f"Nothing but the air changed, as recorded{size}; the coefficients agree."
+    beside, sets = doc.rule.endswith(BESIDE), doc.sets or (doc.effects,)
+    return say.claimed(verdict, doc.probability or 0.0, sets, _ways(doc), partial(_title, doc), beside, change)
 
 
 def _title(doc: ComparedRuns, name: str) -> str:
     """Title of a cause, or of a pair of them, with the size as far as it was worked out."""
-    return titled(name, next((r.parameters for r in doc.ranking if r.effect == name), {}), doc.full_scale)
+    found = next((r.parameters for r in doc.ranking if r.effect == name), {})
+    if "+" not in name:
+        return titled(name, found, doc.full_scale)
+    each = {i: {k[len(i) + 1 :]: v for k, v in found.items() if k.startswith(f"{i}.")} for i in name.split("+")}
+    return " and ".join(titled(i, own, doc.full_scale) for i, own in each.items())
 
 
-def _moved(doc: ComparedRuns) -> str:
-    """What changed by how much: a cause in the drive has moved the drive, not the loads."""
-    drive = {FAMILY.get(k, k) for k in doc.effects} == {"drive"}
-    kinds = ("speed", "voltage", "electrical") if drive else ("thrust", "torque", *WITHOUT_SPEED)
-    loads = {r.kind: (_at(WORD[c], r), r) for c, r in doc.ratios.items()}
-    shown = [loads[k] for k in kinds if k in loads][:2]
-    shares = _intervals([r for _, r in shown])
-    return " and ".join(f"{word} {share[0]}" for (word, _), share in zip(shown, shares, strict=True))
+def _ways(doc: ComparedRuns) -> list[say.Way]:
+    """What a class stands for, the likeliest first."""
+    P = _posterior(doc)
+    return [say.Way(_title(doc, str(k)), P.get(k, 0.0)) for k in ways(doc.effects, P)]
 
 
-def _at(word: str, r: Ratio) -> str:
-    """What a ratio is of, and at what it is taken if not at the speed."""
-    return f"{word} at equal {WITHOUT_SPEED[r.kind]}" if r.kind in WITHOUT_SPEED else word
+def _posterior(doc: ComparedRuns) -> dict[Explanation, float]:
+    alone = {str(k): k for k in (NONE, UNKNOWN, DOUBT)}
+    of = {k: alone[k] if k in alone else Explanation.of(*k.split("+")) for k in (r.effect for r in doc.ranking)}
+    return {of[r.effect]: r.probability for r in doc.ranking}
 
 
 def _open(doc: ComparedRuns, size: str) -> str:
-    """Why nothing is said, and what is likeliest."""
+    """Why nothing is said."""
     if doc.rule.endswith(NO_SPEED):
         return f"Something changed: {doc.rule}."
     if doc.rule.endswith((IN_WIND, NOTHING_SHARED)):
         return f"These recordings cannot be compared: {doc.rule}."
     if doc.rule.startswith(SPREAD):
         return f"These recordings cannot say whether anything changed{size}; two runs may differ by as much."
-    guess = "" if doc.rule == OTHER_STAND else families(_likely(doc), doc.ranking)
-    return f"These recordings cannot say what changed{size}" + (f"; likeliest {guess}." if guess else ".")
-
-
-def _likely(doc: ComparedRuns) -> list[str]:
-    """Causes that are likely enough to be said as a guess, the likeliest first."""
-    return [r.effect for r in doc.ranking if r.probability >= _GUESS and r.effect not in _NO_CAUSE]
-
-
-def families(effects: Sequence[str], ranking: Sequence[RankedCause] = ()) -> str:
-    """What an engineer would look at, the likeliest first; "" where nothing is listed."""
-    likely = {r.effect: r.probability for r in ranking}
-    titles: dict[str, list[str]] = {}
-    for k in effects:
-        titles.setdefault(FAMILY.get(k, k), []).append(k)
-    order = sorted(titles, key=lambda f: -sum(likely.get(k, 0.0) for k in titles[f]))
-    return ", or ".join(FAMILY_WORD.get(f, f) if len(titles[f]) > 1 else title_of(titles[f][0]) for f in order)
+    if doc.rule == OTHER_STAND:
+        return f"Something is wrong{size}: {doc.rule}."
+    return f"{say.something(_posterior(doc))}{size}, and these recordings do not show what."
 
 
 def _ends(r: Ratio, factor: float = 1.0) -> list[str]:
@@ -364,19 +312,31 @@ def _ends(r: Ratio, factor: float = 1.0) -> list[str]:
 
 
 def _said(doc: ComparedRuns) -> list[str]:
-    """Sentences on loads, density, cause, drive and next step, with the command."""
+    """Sentences on loads, cause, what speaks against it, and the next step with its command."""
     text, command = (doc.next_measurement.get(k) for k in ("text", "command"))
-    told = (doc.told or ()) if doc.diagnosis else (sentence(doc),)
-    below = ("Next: ", "bemt ", "if ") if text else ()
-    out = [*_of_loads(doc), *_of_density(doc.density), *(t for t in told if not t.lstrip().startswith(below)),
-           *_of_miscount(doc), *_of_drive(doc), *([f"Next: {text}."] if text else [])]  # fmt: skip
-    out = [textwrap.fill(line, 110, initial_indent="  ", subsequent_indent="    ") for line in out]
-    if command:
-        checks = "" if doc.diagnosis else doc.next_measurement.get("checks")
-        out += [f"    if {title_of(checks)} is ruled out:"] if checks else []
-        out += [f"    {t.strip()}" for t in told if t.lstrip().startswith("if ")]
-        out.append(f"    {command}")
-    return out
+    told = doc.told if doc.diagnosis and doc.told else _causes(doc)
+    out = [*say.seen(doc.ratios, "B against A"), *_of_density(doc.density), *told, *_of_miscount(doc), *_of_drive(doc),
+           *_of_files(doc), *([f"Next: {text}."] if text else [])]  # fmt: skip
+    if command and "CASE" in command.split():
+        out.append("  with a case of this rotor, or its label, the solver weighs the causes:")
+    elif command and (checked := doc.next_measurement.get("checks")):
+        out.append(f"  if {title_of(checked)} is ruled out:")
+    return [line for words in (*out, *([f"  {command}"] if command else [])) for line in say.wrapped(words)]
+
+
+def _of_files(doc: ComparedRuns) -> list[str]:
+    """What cannot be so in A or B, and what the files leave out."""
+    wrong, warned = [], []
+    for note in doc.notes:
+        if note.startswith(recordings.ERROR_IN[0]):
+            where, kind, evidence = note.removeprefix(recordings.ERROR_IN[0]).split(": ", 2)
+            wrong.append(say.Wrong(where, kind, evidence.removeprefix("thrust_N: ").removeprefix("torque_Nm: ")))
+        elif note.startswith(recordings.ERROR_IN):
+            warned.append(f"{note[0].upper()}{note[1:]}.")
+    wrong = [w._replace(both=any(w.kind == v.kind and w.where != v.where for v in wrong)) for w in wrong]
+    first = next(iter(doc.ranking), None)
+    cause = {first.effect: first.parameters} if first and doc.effects[:1] == (first.effect,) else {}
+    return [*say.of_files(wrong, cause), *warned]
 
 
 def _of_density(density: Densities) -> list[str]:
@@ -388,7 +348,8 @@ def _of_density(density: Densities) -> list[str]:
 
 def _of_miscount(doc: ComparedRuns) -> list[str]:
     """The commonest miscount of the speed that moves the loads as they moved, where that is a likely cause."""
-    if doc.diagnosis or "rpm_scale" not in (*doc.effects, *_likely(doc)):
+    likely = [r.effect for r in doc.ranking if r.probability >= _GUESS]
+    if doc.diagnosis or "rpm_scale" not in (*doc.effects, *likely):
         return []
     r = next((r for r in doc.ratios.values() if r.kind == "thrust"), None)
     low, high = (r.high95**-0.5, r.low95**-0.5) if r else (math.inf, 0.0)
@@ -399,60 +360,22 @@ def _of_miscount(doc: ComparedRuns) -> list[str]:
 def _of_drive(doc: ComparedRuns) -> list[str]:
     """What the drive says beside the answer."""
     drive = doc.subsystems.get("drive")
-    if drive and drive.effects and drive.effects != doc.effects:
-        return [f"Drive: {drive.verdict}: {', '.join(title_of(k) for k in drive.effects)}."]
+    if drive and not set(drive.effects) <= {*doc.effects}:
+        return [f"Drive: {', '.join(map(title_of, drive.effects))}."]
     if drive and doc.verdict != "none" and drive.verdict == "none":
         moved = any(r.kind in OVER_COMMAND and not r.low95 < 1.0 < r.high95 for r in doc.ratios.values())
         return [f"Drive: no change beyond {'what load, voltage or a miscount explains' if moved else 'scatter'}."]
     return []
 
 
-def _of_loads(doc: ComparedRuns) -> list[str]:
-    """How far the loads of B are from those of A."""
-    loads = {c: r for c, r in doc.ratios.items() if r.kind in ("thrust", "torque", *WITHOUT_SPEED)}
-    if not loads:
-        return []
-    first, intervals = next(iter(loads.values())), _intervals(list(loads.values()))
-    words = [f"{WORD[c]} {at} ({low} to {high})" for c, (at, low, high) in zip(loads, intervals, strict=True)]
-    where = "extrapolated to one speed" if first.extrapolated else _range(first)
-    grows = [WORD[c] for c, r in loads.items() if r.depends_on]
-    at = WITHOUT_SPEED.get(first.kind, "speed")
-    more = f"The ratio of {' and '.join(grows)} changes with {'it' if at != 'speed' else 'speed or advance ratio'}."
-    return [f"B against A at equal {at}, {where}: {', '.join(words)}; 95 % in brackets.", *([more] if grows else [])]
-
-
-def sentence(doc: ComparedRuns) -> str:
-    """Verdict and reason."""
-    names = ", ".join(map(title_of, doc.effects))
-    sure = f" (probability {doc.probability:.2f})" if doc.probability else ""
-    if doc.verdict == "none":
-        return f"{doc.rule[0].upper()}{doc.rule[1:]}."
-    if doc.verdict in ("named", "sensor"):
-        lead = "The stand" if doc.verdict == "sensor" else "What changed"
-        return f"{lead}: {names}{sure}: {doc.rule}."
+def _causes(doc: ComparedRuns) -> list[str]:
+    """What else it may be, or what is likeliest; the reason where there is one."""
     if doc.verdict == "class":
-        if len(doc.sets) > 1:  # more than one cause
-            return f"{doc.rule}{sure}: {names}."
-        P = {Explanation.of(*r.effect.split("+")): r.probability for r in doc.ranking}
-        return one_of(doc.probability, {_title(doc, str(k)): P.get(k, 0.0) for k in ways(doc.effects, P)})
-    if doc.verdict == "unknown":
-        return f"Unknown: {doc.rule}."
-    first = [title_of(k) for k in _likely(doc)]
-    if doc.rule == OTHER_STAND or doc.rule.endswith((IN_WIND, NOTHING_SHARED, NO_SPEED)):
-        return f"No cause can be given: {doc.rule}."
-    if doc.rule.startswith(SPREAD):
-        return f"No change is proven: {doc.rule}" + (f"; else {', '.join(first)}" if first else "") + "."
-    return f"There is a change, but {doc.rule}" + (f". Likeliest: {', '.join(first)}" if first else "") + "."
-
-
-def one_of(total: float | None, each: Mapping[str, float]) -> str:
-    """What a class stands for, each way with its probability.
-
-    >>> one_of(0.97, {"gain": 0.9, "zero": 0.07, "duct": 0.001})
-    'One of these (0.97 in all): gain 0.90; zero 0.07; duct below 0.01.'
-    """
-    listed = "; ".join(f"{title} {p:.2f}" if p >= _LEAST else f"{title} below {_LEAST}" for title, p in each.items())
-    return f"One of these{'' if total is None else f' ({total:.2f} in all)'}: {listed}."
+        return say.others(_ways(doc), doc.sets, partial(_title, doc), _posterior(doc))
+    if doc.verdict == "insufficient" and not doc.rule.endswith((IN_WIND, NOTHING_SHARED, NO_SPEED)):
+        return say.likeliest(_posterior(doc), lambda k: _title(doc, str(k)), say.NO_CHANGE)
+    told = doc.rule.startswith((ON_ONE, *recordings.AS_RECORDED)) or doc.rule == REVERSED
+    return [] if told or doc.verdict not in CLAIMS else [f"{doc.rule[0].upper()}{doc.rule[1:]}."]
 
 
 def _tables(doc: ComparedRuns) -> list[str]:

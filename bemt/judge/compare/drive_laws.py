@@ -20,7 +20,7 @@ from bemt.base.gaussian.whitening import log_density, whitener
 from bemt.judge.compare import smooth_change as fits
 from bemt.judge.compare.matched import FOLLOWS_LOAD, POWER_OF_SPEED, MatchedChannel
 from bemt.judge.compare.smooth_change import Scatter
-from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation, KindPrior, Sizes
+from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation, KindPrior, Size, Sizes
 from bemt.judge.loss import Decision, decide
 from bemt.physics.effects import catalogue
 from bemt.physics.effects.base import FORM
@@ -67,14 +67,17 @@ class Judgement(Decision):
     ranked: Mapping[Explanation, float] = field(default_factory=dict)  # Of every explanation, the likeliest first [1]
     parameters: Sizes = field(default_factory=dict)  # Of effects, as far as they were worked out
     full_scale: Mapping[str, float] = field(default_factory=dict)  # Largest readings of B that shares are of [SI]
+    # Parameters of the likeliest explanations, each alone, by name as a ranking has them
+    sizes: Mapping[Explanation, Mapping[str, Size]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, said: Decision, P: Mapping[Explanation, float], parameters: Sizes | None = None,
-           full_scale: Mapping[str, float] | None = None) -> Judgement:  # fmt: skip
+           full_scale: Mapping[str, float] | None = None,
+           sizes: Mapping[Explanation, Mapping[str, Size]] | None = None) -> Judgement:  # fmt: skip
         """The same decision with its posterior."""
         ranked = dict(sorted(P.items(), key=lambda kv: -kv[1]))
         return cls(**{f.name: getattr(said, f.name) for f in fields(Decision)}, ranked=ranked,
-                   parameters=parameters or {}, full_scale=full_scale or {})  # fmt: skip
+                   parameters=parameters or {}, full_scale=full_scale or {}, sizes=sizes or {})  # fmt: skip
 
 
 @dataclass(frozen=True)

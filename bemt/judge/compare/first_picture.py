@@ -19,9 +19,10 @@ import numpy as np
 from bemt.base import canvas
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.judge.compare.change_document import WORD, ComparedRuns, headline
+from bemt.judge.compare.change_document import ComparedRuns, headline
 from bemt.judge.compare.matched import OVER_COMMAND, POWER_OF_SPEED, WITHOUT_SPEED, MatchedChannel
 from bemt.judge.compare.recordings import RunChange
+from bemt.judge.compare.sentences import WORD
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case import Case
 from bemt.rotors.case.propagate import propagate

@@ -88,7 +88,7 @@ def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> 
     points = Dataset(
         series.kind, name, values, {k: series.u[k] for k in values if k in series}, labels=series.labels,
         notes=(*ramp, *(n for n in series.notes if "no density" not in n)),
-        units={"command": "s" if command == "pwm_s" else "-"},
+        units={"command": "s" if command == "pwm_s" else "-"}, lines=_lines(series, imported),
     )  # fmt: skip
     return StandRun(
         points, command, float(np.nanmean(rho)) if np.isfinite(rho).any() else constant["density_kg_m3"],
@@ -99,6 +99,12 @@ def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> 
         command == "pwm_s" and any(note.endswith(THROTTLE_IS_PULSE) for note in series.notes),
         cfd_setup.stated_setup(imported),
     )  # fmt: skip
+
+
+def _lines(series: Dataset, imported: Dataset) -> tuple[int, ...]:
+    """Line of the file of each point; none where a point is made of many."""
+    how = reduction(series)
+    return tuple(imported.lines[int(rows[0])] for rows in how.rows) if how.mode == "points" and imported.lines else ()
 
 
 def _comparable(values: Mapping[str, Array], imported: Dataset, name: str) -> None:

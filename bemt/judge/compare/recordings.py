@@ -51,7 +51,7 @@ IN_WIND = "as in wind, and no airspeed is recorded"
 """End of the reason where one recording shows a wind that it does not state."""
 ONLY_VOLTS = " voltage at equal electrical power"
 """End of the reason where thrust per watt is the same and the voltage is not."""
-NO_SPEED = "without the speed, rotor, motor and scale look alike"
+NO_SPEED = "without a speed a change of rotor, motor or scale looks the same"
 """Reason where thrust was compared at equal power or command."""
 OTHER_STAND = "no change on one stand moves every load by this much: check units and speeds of both files"
 
@@ -100,7 +100,7 @@ class RunChange:
         moved = float(np.median(np.log(np.interp(shared, P_b, V_b) / np.interp(shared, P, V))))
         if abs(moved) < drive_laws.TOLD_VOLTAGE:
             return ""
-        size = f"{abs(math.expm1(moved)):.1%} {'less' if moved < 0.0 else 'more'}"
+        size = f"{100.0 * abs(math.expm1(moved)):.1f} % {'less' if moved < 0.0 else 'more'}"
         return f"the battery or supply of B gave {size}"
 
     @cached_property
@@ -116,7 +116,7 @@ class RunChange:
     def no_speed(self) -> str:
         """Why thrust that changed has no cause without a speed, with its change at each."""
         found = [fits.ratio_of(c, scatter) for c, scatter in self._bare]
-        told = {f"{r.ratio - 1.0:+.1%} at equal {matched.WITHOUT_SPEED[r.kind]}": None for r in found}
+        told = {f"{100.0 * (r.ratio - 1.0):+.1f} % at equal {matched.WITHOUT_SPEED[r.kind]}": None for r in found}
         return f"thrust {', '.join(told)}; {NO_SPEED}"
 
     @cached_property
@@ -206,7 +206,8 @@ class RunChange:
         loads, drive = self.with_density(decide(P)).reasoned_as(self.loads), decide(Q).reasoned_as(self.drive)
         said = joined(loads, drive, P.get(NONE, 0.0))
         P = {"model": P, "drive": Q}.get(said.by, P | Q)
-        return Judgement.of(said, P, {**self.loads.parameters, **self.drive.parameters}, self.loads.full_scale)
+        sizes = {**self.loads.parameters, **self.drive.parameters}
+        return Judgement.of(said, P, sizes, self.loads.full_scale, self.loads.sizes)
 
     def with_density(self, said: Decision) -> Decision:
         """The recorded densities as the cause where nothing else is one."""
@@ -359,18 +360,19 @@ def _assumed(a: StandRun, b: StandRun, diameter: float, loads: Mapping[str, Matc
     by_thermometer = bool(unknown) and bool(density_change(a, b)[1])
     still = [n for n, r in runs if not {"airspeed_m_s", "J"} & r.points.values.keys()]
     no_diameter = math.isnan(diameter) and not all("J" in r.points for _, r in runs)
-    air, wind = (" ".join(f"--air-{n.lower()} {told}" for n in some)
-                 for some, told in ((unknown, "22C,1013hPa"), (still, "18m/s")))  # fmt: skip
+    loads_known = {"thrust_N", "torque_Nm", "power_W"} & set(names) and not by_thermometer
+    alike = [("equal air density", "22C,1013hPa", unknown if loads_known else []), ("still air", "18m/s", still)]
+    told = [(words, how, letters) for words, how, letters in alike if letters]
+    if len(told) == 2 and unknown == still:
+        told = [("equal air density and still air", "22C,1013hPa,18m/s", still)]
     said = (
         (by_thermometer, "air pressure is not recorded in both: taken as equal within 1 %"),
-        (unknown and not by_thermometer and {"thrust_N", "torque_Nm", "power_W"} & set(names),
-         f"air density is not recorded in {' and '.join(unknown)}: taken as equal; {air} states it"),
-        (still, f"airspeed is not recorded in {' and '.join(still)}: taken as still air; {wind} states a wind"
-                " (with the air: 22C,1013hPa,18m/s)"),
+        *((True, f"{words} in {' and '.join(letters)} (not recorded; state it as in --air-{letters[0].lower()} {how})")
+          for words, how, letters in told),
         ("torque" not in loads and "thrust" in loads,
          "torque is not recorded in both: thrust alone cannot tell gain, air and blade apart"),
         ("electrical_power_W" in names,
-         "torque is not recorded: electrical power replaces it, assuming the same motor and controller in both"),
+         "torque is not recorded: electrical power replaces it, of one motor and controller"),
         ("at_power" in loads,
          "speed is not recorded in both: electrical power replaces it, of one motor and controller"),
         ("at_command" in loads,

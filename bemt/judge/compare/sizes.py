@@ -13,10 +13,11 @@ from bemt.physics.effects import Parameter
 
 Found = Mapping[str, Size]
 """Parameters of one effect, by name."""
-_WORD = {"thrust_N": "thrust", "torque_Nm": "torque", "rpm": "speed", "airspeed_m_s": "airspeed",
-         "density_kg_m3": "density", "loads": "thrust and torque"}  # fmt: skip
+READ = {"thrust_N": "thrust", "torque_Nm": "torque", "rpm": "speed", "airspeed_m_s": "airspeed",
+        "density_kg_m3": "density", "loads": "thrust and torque"}  # fmt: skip
+"""What a sensor reads, in a word."""
 _UNIT = {"thrust_N": "N", "torque_Nm": "N m", "rpm": "rev/min"}
-_SEEN = 0.05  # least probability of a value that is listed
+_SEEN, _NEARLY = 0.05, 0.5  # least probability of a value that is listed, and share of the likeliest that is as likely
 
 
 def titled(name: str, found: Found, largest: Mapping[str, float] | None = None) -> str:
@@ -29,9 +30,11 @@ def titled(name: str, found: Found, largest: Mapping[str, float] | None = None) 
         return title
     told = _stated(name, found) or _likeliest(found)
     sizes = [p for p in cls.parameters if p.off is not None and (p.steps or p.name == "eps") and p.name in found]
-    value = found[sizes[0].name].value if len(sizes) == 1 else None
-    if not told and isinstance(value, float) and (sizes[0].unit != "1" or _is_share(sizes[0])):
-        told = sized(sizes[0], value, "+.3g") + of_largest(name, sizes[0].name, value, largest or {})
+    p, size = (sizes[0], found[sizes[0].name]) if len(sizes) == 1 else (None, None)
+    shown = not told and p and size and isinstance(size.value, float) and (p.unit != "1" or _is_share(p))
+    if p and size and shown and not size.low < p.off < size.high:
+        told = sized(p, size.value, "+.3g" if p.low < 0.0 else ".3g")
+        told += of_largest(name, p.name, size.value, largest or {})
     return f"{title} ({told})" if told else title
 
 
@@ -49,26 +52,29 @@ def in_words(found: Found) -> str:
     >>> in_words(of)
     'x7/6: 6 pole pairs set instead of 7 (0.77), or x8/7: 7 pole pairs set instead of 8 (0.21)'
     """
-    if "factor" not in found:
-        return ""
-    factor, unit = found["factor"], found.get("unit")
-    left = [(v, p) for v, p in (unit or factor).odds or () if p >= _SEEN]
-    if len(left) < 2:
-        return _likeliest(found)
-    each = [(_of_unit(found, v) if unit else _of_speed(v), p) for v, p in left]
-    return ", or ".join(f"{words} ({p:.2f})" for words, p in each if words)
+    each = [(words, p) for words, p in _values(found) if p >= _SEEN]
+    return ", or ".join(f"{words} ({p:.2f})" for words, p in each) if len(each) > 1 else _likeliest(found)
 
 
 def _likeliest(found: Found) -> str:
-    """What is likeliest of them; "" for effects that have no factor, and for a factor of 1."""
+    """What is likeliest of them, and what is nearly as likely; "" without a factor, and for a factor of 1."""
+    each = _values(found)
+    return ", or ".join(words for words, p in each if p > _NEARLY * each[0][1])
+
+
+def _values(found: Found) -> list[tuple[str, float]]:
+    """What a factor may be, in words, and how likely, the likeliest first."""
     if "factor" not in found:
-        return ""
-    return _of_unit(found, found["unit"].value) if "unit" in found else _of_speed(found["factor"].value)
+        return []
+    told = found.get("unit", found["factor"])
+    each = sorted(told.odds or ((told.value, 1.0),), key=lambda one: (one[0] != told.value, -one[1]))
+    words = ((_of_unit(found, v) if "unit" in found else _of_speed(v), p) for v, p in each)
+    return [(w, p) for w, p in words if w]
 
 
 def _of_unit(found: Found, unit: str) -> str:
     joint = " " if unit.startswith("taken") else " of " if unit.startswith("the other") else " in "
-    return f"{_WORD[found['channel'].value]}{joint}{unit}"
+    return f"{READ[found['channel'].value]}{joint}{unit}"
 
 
 def _of_speed(factor: float) -> str:
@@ -86,7 +92,7 @@ def of_largest(name: str, parameter: str, value: float, largest: Mapping[str, fl
 
 def _is_share(p: Parameter) -> bool:
     """Whether a number without a unit is a share of something."""
-    return p.unit == "1" and p.off == 0.0 and max(abs(p.low), abs(p.high)) < 1.0
+    return p.unit == "1" and p.off == 0.0 and max(abs(p.low), abs(p.high)) <= 1.0
 
 
 def sized(p: Parameter, value: float, form: str = ".3g") -> str:

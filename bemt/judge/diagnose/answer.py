@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.judge.compare.change_document import WORD
+from bemt.judge.compare.sentences import WORD
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose.record import CHANNELS
 from bemt.judge.explanation import UNKNOWN, Explanation, Sizes
@@ -126,8 +126,8 @@ class Location:
                 ends = {True: "up to ", False: "down to "}[s.size > 0.0] if s.wide else ""
                 told = f"{ends}{share(s.size)} of what the case gives"
             by_place.setdefault(self._place(s), []).append(told)
-        name = VARIABLES.get(self.variable, (self.variable, "", 3))[0]
-        each = [f"{' and '.join(told)}, at {'' if k else f'{name} '}{place}"
+        name = "" if self.by_speed else f"{VARIABLES.get(self.variable, (self.variable,))[0]} "
+        each = [f"{' and '.join(told)}, at {'' if k else name}{place}"
                 for k, (place, told) in enumerate(by_place.items())]  # fmt: skip
         return f"{words[self.channel].capitalize()} is {', '.join(each[:-1])}{', and ' * (len(each) > 1)}{each[-1]}."
 
@@ -135,9 +135,13 @@ class Location:
         """Where a stretch is."""
         _, unit, digits = VARIABLES.get(self.variable, (self.variable, "", 3))
         ends = " to ".join(dict.fromkeys(f"{x:.{digits}f}" for x in (s.low, s.high))) + unit
-        if self.variable in ("M_tip", "Re"):
-            ends += f" ({' to '.join(dict.fromkeys(f'{n:.0f}' for n in s.rpm))} rev/min)"
-        return ends
+        speeds = f"{' to '.join(dict.fromkeys(f'{n:.0f}' for n in s.rpm))} rev/min"
+        return speeds if self.by_speed else f"{ends} ({speeds})" if self.variable in ("M_tip", "Re") else ends
+
+    @property
+    def by_speed(self) -> bool:
+        """Whether the mismatch follows the speed of rotation as well as it follows what goes with it."""
+        return self.variable == "rpm" or (self.variable in ("M_tip", "Re") and "rpm" in self.ties)
 
 
 def locate(found: Evidence, best: fitting.Fit) -> Location:

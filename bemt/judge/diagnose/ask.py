@@ -71,7 +71,7 @@ class Answer(VerdictAnswer):
     >>> answer.verdict, answer.effects, answer.to_dict()["schema"]
     ('named', ('pitch_offset',), 'bemt.diagnosis/1')
     >>> print(answer.text.splitlines()[0])
-    Cause found: wrong blade angle (+1.5 deg).
+    Cause found: wrong blade angle (+1.5 deg), probability above 0.99.
     >>> improved = answer.improved.solve(rpm, J=J, bands=False)
     >>> bool(np.max(np.abs(improved.thrust_N / turned.thrust_N - 1)) < 0.02)
     True

@@ -42,6 +42,7 @@ _COVARIATES = ("time_s", "temperature_K", "tip_gap_m", "wall_distance_m", "secon
 # Where nothing tells: density [kg/m3], diameter [m] and speed [rev/min] that coefficients are turned into loads with.
 _RHO, _D, _RPM = 1.2, 0.25, 6000.0
 _FEWEST = 4
+_TOLD = 1e-3  # probability from which the size of an explanation is told
 # At rest a coefficient below this share of the usual one is no reading of a turning rotor.
 _NEAR_ZERO = 0.15
 # Rows this many robust standard deviations off the curve through all of them are strays, and at least this share off.
@@ -79,6 +80,8 @@ def judged(pair: RunChange, only: Collection[str] | None = None) -> Judgement:
         leading = said.leading
         solved = said.effects and leading and all(i in found.spans for i in leading)
         parameters = fitting.refined(found, fitting.fit(found, leading))[1] if solved else {}
+        likely = [k for k, p in P.items() if p > _TOLD and k.ids and all(i in found.spans for i in k)]
+        sizes = {k: fitting.flat(k, fitting.intervals(found, k)) for k in likely}
     said = pair.with_density(said)
     if pair.turned and said.effects == ("unit_slip",):
         said = replace(said, why=recordings.REVERSED)
@@ -86,7 +89,7 @@ def judged(pair: RunChange, only: Collection[str] | None = None) -> Judgement:
         said = replace(said, why=why)
     test = found.problem.parts[0]
     told = (k for k in test.channels if k not in test.record.unitless and not (k == "torque_Nm" and pair.by_proxy))
-    return Judgement.of(said, P, parameters, {k: test.full_scale[k] for k in told})
+    return Judgement.of(said, P, parameters, {k: test.full_scale[k] for k in told}, sizes)
 
 
 def _factored(found: posterior.Evidence, pair: RunChange) -> dict[Explanation, float]:

@@ -188,7 +188,7 @@ def _scores(found: posterior.Evidence, after: Array, held: Array, gp_only: Array
 
 def _next(
     found: posterior.Evidence, decision: loss.Decision, best: fitting.Fit, given: suggestion.Given
-) -> suggestion.Suggestion:
+) -> suggestion.Suggestion:  # fmt: skip
     """What settles the question, and what to type then."""
     chosen = _settling(found, decision, best)
     if not chosen.kind and decision.verdict == "named":  # nothing is open: into the case with it

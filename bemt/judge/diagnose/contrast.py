@@ -48,8 +48,6 @@ if TYPE_CHECKING:
     from bemt.data.recordings.findings import Finding
     from bemt.rotors.case import Case
 
-# Remarks on the files come first in an explanation; `import` shows them.
-_REMARK = "Before any physics"
 # Finding on a column that is no measurement; two columns with one ratio may be computed ones.
 _STUCK = "constant_column"
 # Rows and number of the values of a column that tells parts of one file apart.
@@ -318,7 +316,8 @@ def _diagnosed(
     """The same with the verdict of the diagnosis of B with A as reference."""
     from bemt.judge.diagnose.chain import diagnose
     from bemt.judge.diagnose.document import document as diagnosis
-    from bemt.judge.diagnose.document import explanation, full_scale
+    from bemt.judge.diagnose.document import full_scale
+    from bemt.judge.diagnose.document import told as sentences
 
     a, b = (
         load(name, case, imported) if "format" in imported.provenance else from_series(imported, case)
@@ -326,10 +325,12 @@ def _diagnosed(
     )
     answer = diagnose([b, replace(a, reference=True)], [case], None, progress, given=_given(asked), change=found)
     by_case = diagnosis(answer)
-    told = [line for line in explanation(answer) if not line.startswith(_REMARK)]
+    found_by_case = sentences(answer)
+    told = [*found_by_case.causes, *found_by_case.against]
     told = [f"The case {case.name}, with A as reference:", *told] if told else []
     verdict, effects, probability, ranking, rule = (by_case[k] for k in DIAGNOSED)
     return replace(said, verdict=verdict, effects=tuple(effects), probability=probability, rule=rule,
+                   sets=tuple(map(tuple, by_case["sets"])),
                    ranking=rows_of(RankedCause, ranking), diagnosis=by_case, case=case.name,
                    told=tuple(told), full_scale=full_scale(answer))  # fmt: skip
 

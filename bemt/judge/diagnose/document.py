@@ -2,39 +2,43 @@
 
 from __future__ import annotations
 
-import textwrap
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from bemt import __version__
 from bemt.base.tables import or_null, text_table
 from bemt.data.recordings.channels import AS_ELECTRICAL, AS_SHAFT
-from bemt.judge.compare.change_document import WORD, families, one_of
+from bemt.judge.compare import sentences as say
 from bemt.judge.compare.drive_laws import title_of
 from bemt.judge.compare.sizes import in_words, of_largest, sized, titled
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import other_rotor
-from bemt.judge.diagnose.answer import POWER, Diagnosis, bare, share
+from bemt.judge.diagnose.answer import Diagnosis, bare, share
 from bemt.judge.diagnose.form import nearest
 from bemt.judge.diagnose.posterior import LEAST
 from bemt.judge.diagnose.record import DROPPED, NO_SPEED, POWER_OPEN
 from bemt.judge.diagnose.suggest import LEVEL
 from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation, Size
-from bemt.judge.loss import CLAIMS, ways
+from bemt.judge.loss import CLAIMS, SPREAD, ways
 from bemt.physics import effects
 from bemt.physics.effects.propeller import AnotherPropeller
 from bemt.rotors.case.fresh import OPEN_ENDINGS
+
+if TYPE_CHECKING:
+    from bemt.judge.compare.recordings import RunChange
 
 SCHEMA = "bemt.diagnosis/1"
 _OPEN = 0.95  # share of a parameter's range that its interval may take before nothing is said of it [1]
 _SHOWN = 8
 _FINDINGS = 3
-_A_GROUP = 5  # members from which on a class is said as a group
 _GUESS = 0.3  # least probability of a guess
 # Level that is said even where no cause shows, and from which on it is asked whether the rotor is that of the case.
 _WORTH_SAYING, _WORTH_ASKING = 0.05, 0.15
-# Lines of an answer, and sentences that are only in its details.
-_LINES, _DETAILS = 12, ("Model: ", "Signature: ", "Predicting ")
+_LINES = 12  # of an answer
+_FINDING = re.compile(r"(.*?): (?:error|warning|note): (\w+) \(.*?\): (.*?)\. Correction: (.*)", flags=re.S)
+_NOTHING = "no cause, only noise and what calibration leaves open"
 
 
 def document(d: Diagnosis) -> dict[str, Any]:
@@ -45,7 +49,7 @@ def document(d: Diagnosis) -> dict[str, Any]:
         solved = name.ids and all(i in found.spans for i in name)
         own = fitting.intervals(found, name) if solved and p > 1e-3 else {}
         sizes = d.parameters if name == d.decision.leading else own
-        flat = {(f"{i}.{k}" if name.pair else k): v.document() for i, q in sizes.items() for k, v in q.items()}
+        flat = {k: v.document() for k, v in fitting.flat(name, sizes).items()}
         ranking.append({"effect": str(name), "probability": p, "parameters": flat})
     return {
         "schema": SCHEMA,
@@ -81,20 +85,95 @@ def document(d: Diagnosis) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _located(d: Diagnosis, claimed: bool) -> list[str]:
-    """What the recording shows; without a cause also, where it is another thing, what calibration would leave of it.
+@dataclass(frozen=True)
+class Told:
+    """Sentences of an answer, in the order in which they are said."""
+
+    first: str
+    seen: list[str]  # What was measured
+    causes: list[str]  # What else it may be
+    against: list[str]  # What the files say against it, or what has to be mended first
+    details: list[str]  # Numbers behind the answer
+    step: list[str]  # Next step, and what to type then
+    last: list[str]  # What was not tried
+
+
+def told(d: Diagnosis) -> Told:
+    """Say the answer."""
+    against = [*_files(d), *_of_another_rotor(d), *_level_alone(d), *_reference_off(d), *_of_loads(d),
+               *(f"{words[:1].upper()}{words[1:]}." for words in d.problem.no_check)]  # fmt: skip
+    details = [*_signs(d), *_beyond(d), *(f"Model: {words}." for words in d.problem.validity), _gain(d)]
+    return Told(headline(d), [*_left_open(d), *_seen(d)], _causes(d), against, details, _next(d), _not_tried(d))
+
+
+def explanation(d: Diagnosis) -> list[str]:
+    """Say the answer in a few sentences."""
+    said = told(d)
+    return [said.first, *said.seen, *said.causes, *said.against, *said.details, *said.step, *said.last]
+
+
+def _change(d: Diagnosis) -> RunChange | None:
+    """Change from the references, of which loads and drive are parts."""
+    return d.change if d.loads is None else d.loads.change
+
+
+def _seen(d: Diagnosis) -> list[str]:
+    """What was measured: the change from the reference, or where the recording is off the case."""
+    words: list[str] = []
+    if change := _change(d):
+        words = say.seen(change.ratios, "Against the reference")
+        words += say.seen(change.ratios, "Against the reference", True) if d.said.by == "drive" else []
+    if words or d.said.verdict == "none":
+        return words
+    return [(d.where if _is_claim(d) else bare(d.found)).sentence(d.words)]
+
+
+def _is_claim(d: Diagnosis) -> bool:
+    return d.said.verdict not in ("unknown", "insufficient") or other_rotor.doubted(d.problem, d.said)
+
+
+def _beyond(d: Diagnosis) -> list[str]:
+    """Without a cause, what calibration would leave of the mismatch, where it is another thing than what was seen.
 
     The location of the document is what remains in the light of the likeliest explanation. Its sign, and where none is
     given even its channel, may be those of something that the recording does not show.
     """
-    if claimed:
-        return [d.where.sentence(d.words)]
-    seen, rest = bare(d.found), d.where
-    lines = [seen.sentence(d.words)]
-    if not seen.one_sided or (seen.channel, seen.size > 0) != (rest.channel, rest.size > 0):
-        words = rest.rest(d.words)
-        lines.append(f"Beyond the uncertainty of gains, blade angle and solver: {words[0].lower()}{words[1:]}")
-    return lines
+    shown, rest = bare(d.found), d.where
+    same = shown.one_sided and (shown.channel, shown.size > 0) == (rest.channel, rest.size > 0)
+    if same or d.said.verdict == "none" or _is_claim(d):
+        return []
+    words = rest.rest(d.words)
+    return [f"Beyond the uncertainty of gains, blade angle and solver: {words[0].lower()}{words[1:]}"]
+
+
+def _causes(d: Diagnosis) -> list[str]:
+    """Size of a cause that is named, what else a class may be, or what is likeliest where nothing is claimed."""
+    said, problem = d.said, d.problem
+    if said.verdict in ("named", "sensor"):
+        size = _parameters(d)
+        brackets = "; 90 % in brackets" if " to " in size else ""
+        return [f"Size: {size}{brackets}."] if size and size not in headline(d) else []
+    if said.verdict == "class":
+        return say.others(_ways(d), said.sets, lambda i: _title(d, i), d.found.probability)
+    if said.verdict == "unknown":
+        where, _, size = d.found.states[0].best_rival.partition(": ")
+        return [f"Something smooth that is not in the library: it shows in {where}, by about {size[:-1]} %."]
+    if said.verdict == "none":
+        return []
+    if not _shown(d) and other_rotor.foreign(problem):
+        return [f"Most likely: {other_rotor.nearest_slips(problem)}."]
+    return say.likeliest(d.found.probability, lambda k: _both(d, k), say.NO_CHANGE if _shown(d) else _NOTHING)
+
+
+def _shown(d: Diagnosis) -> bool:
+    """Whether a reference shows the rotor."""
+    return not d.problem.free.all()
+
+
+def _signs(d: Diagnosis) -> list[str]:
+    known = effects.catalogue()
+    signs = "; ".join(known[i].sign for i in d.said.effects if i in known and known[i].sign)
+    return [f"Signature: {signs}."] if signs and d.said.verdict in ("named", "sensor") else []
 
 
 def _gain(d: Diagnosis) -> str:
@@ -132,10 +211,9 @@ def _parameters(d: Diagnosis) -> str:
     return "; ".join(each)
 
 
-def _title(d: Diagnosis, name: str, sized: bool = False) -> str:
-    """Title of an effect, with its state if that is not the usual one; ``sized``: where one number is its size, it."""
-    found = d.parameters.get(name, {})
-    return titled(name, found if sized else {k: v for k, v in found.items() if k == "state"}, full_scale(d))
+def _title(d: Diagnosis, name: str) -> str:
+    """Title of an effect, with its state if that is not the usual one, or its size."""
+    return titled(name, d.parameters.get(name, {}), full_scale(d))
 
 
 def full_scale(d: Diagnosis) -> Mapping[str, float]:
@@ -152,28 +230,30 @@ def _odds(told: Size) -> str:
     return " [" + ", ".join(f"{v if isinstance(v, str) else f'{v:.3g}'} {p:.2f}" for v, p in odds) + "]"
 
 
-def explanation(d: Diagnosis) -> list[str]:
-    """Say the answer in a few sentences."""
-    return [
-        headline(d), *(f"{words[:1].upper()}{words[1:]}." for words in d.problem.no_check), *_before_physics(d),
-        *(f"Model: {words}." for words in d.problem.validity), *_reference_off(d), *_of_another_rotor(d),
-        *(_without_cause(d) if d.said.verdict == "none" else _with_cause(d)), _gain(d), *_of_loads(d), *_next(d),
-        *_not_tried(d),
-    ]  # fmt: skip
+def _files(d: Diagnosis) -> list[str]:
+    """What the files contradict or lose."""
+    problem = d.problem
+    question, wrong, rest = other_rotor.finding(problem), [], []
+    known = [f for p in problem.parts if p.record.reference for f in p.record.findings]
+    shared, claim = {m[2] for m in map(_FINDING.fullmatch, known) if m}, d.said.verdict in CLAIMS
+    for f in (f for f in problem.findings if f not in known):
+        if m := _FINDING.fullmatch(f):
+            wrong.append(say.Wrong(m[1], m[2], m[3], "" if claim else m[4], m[2] in shared))
+        elif f != question or not other_rotor.foreign(problem):
+            rest.append(f"In the file: {f}.")
+    cause = {i: d.parameters.get(i, {}) for i in d.said.leading} if claim else {}
+    found = [*say.of_files(wrong, cause), *rest]
+    if left := found[_FINDINGS:]:
+        found[_FINDINGS - 1 :] = [f"{found[_FINDINGS - 1]} And {len(left)} more; `import` shows all."]
+    return [*found, *(f"In the file: {note}." for note in problem.notes if DROPPED in note)]
 
 
-def _before_physics(d: Diagnosis) -> list[str]:
-    """What the files leave open, contradict or lose."""
-    problem, notes = d.problem, d.problem.notes
+def _left_open(d: Diagnosis) -> list[str]:
+    """What the files leave open and was taken in another way than they say, so that all else hangs on it."""
     marks = [NO_SPEED, AS_ELECTRICAL, POWER_OPEN]
-    if d.said.verdict != "none" and abs(problem.level.get("torque_Nm", 0.0)) > LEVEL:
+    if d.said.verdict != "none" and abs(d.problem.level.get("torque_Nm", 0.0)) > LEVEL:
         marks.append(AS_SHAFT)
-    findings = list(problem.findings[:_FINDINGS])
-    if left := problem.findings[_FINDINGS:]:
-        findings[-1] += f" And {len(left)} more; `import` shows all."
-    open_ = (f"{note}." for note in notes if any(mark in note for mark in marks))
-    dropped = (f"{note}." for note in notes if DROPPED in note)
-    return [f"Before any physics: {words}" for words in (*open_, *findings, *dropped)]
+    return [f"In the file: {note}." for note in d.problem.notes if any(mark in note for mark in marks)]
 
 
 def _reference_off(d: Diagnosis) -> list[str]:
@@ -181,9 +261,11 @@ def _reference_off(d: Diagnosis) -> list[str]:
     stated = d.problem.blade.moved
     if all(abs(v) <= LEVEL for v in stated.values()):
         return []
-    off = " and ".join(f"{d.words[c]} {share(v)}" for c, v in stated.items())
-    return [f"The reference is off the case as stated by {off}; the blade was fitted to it. Are diameter, "
-            "pitch and blades of the case right?"]  # fmt: skip
+    off = ", ".join(f"{d.words[c]} {share(v)}" for c, v in stated.items())
+    what = (
+        "The case is not this rotor (reference:" if other_rotor.unlike(stated) else "The reference is off the case (by"
+    )
+    return [f"{what} {off}); the blade was fitted to the reference, so the comparison holds."]
 
 
 def _level(d: Diagnosis) -> str:
@@ -206,40 +288,13 @@ def _of_another_rotor(d: Diagnosis) -> list[str]:
     return [" ".join(words)] if words else []
 
 
-def _without_cause(d: Diagnosis) -> list[str]:
-    """Why there is no cause, and that the level is off all the same."""
+def _level_alone(d: Diagnosis) -> list[str]:
+    """That the level is off where there is no cause."""
     level = max(map(abs, d.problem.level.values()), default=0.0)
-    lines = [f"Why: {d.said.why}."]
-    if level > _WORTH_SAYING:
-        ask = d.problem.free.all() and level > _WORTH_ASKING
-        lines.append(
-            f"The level is off ({_level(d)}), within what gain, blade angle and solver allow; no cause shows."
-            + (f" Are {_stated(d)} right?" if ask else "")
-        )
-    return lines
-
-
-def _with_cause(d: Diagnosis) -> list[str]:
-    """Where the recording differs from the case, and what is said of the cause."""
-    said = d.said
-    if said.verdict in ("named", "sensor"):
-        told, known = _parameters(d), effects.catalogue()
-        named = f"Named: {', '.join(map(title_of, said.effects))} (probability {said.probability:.2f})"
-        signs = "; ".join(known[i].sign for i in said.effects if i in known and known[i].sign)
-        words = [f"{named}: {told}." if told else f"{named}.", *([f"Signature: {signs}."] if signs else [])]
-    elif said.verdict == "class":
-        if len(said.sets) < 2:
-            words = [one_of(said.probability, {_both(d, k): d.found.probability.get(k, 0.0) for k in _ways(d)})]
-        else:
-            listed = ", ".join(_title(d, i) for i in said.effects)
-            words = [f"{said.why[0].upper()}{said.why[1:]} ({said.probability:.2f}): {listed}."]
-    elif said.verdict == "unknown":
-        where, _, size = d.found.states[0].best_rival.partition(": ")
-        words = [f"The cause is not in the library: {said.why}. It shows in {where}, by about {size[:-1]} %."]
-    else:
-        words = [f"No name is given: {said.why}."]
-    claimed = said.verdict not in ("unknown", "insufficient") or other_rotor.doubted(d.problem, said)
-    return [*_located(d, claimed), *words]
+    if d.said.verdict != "none" or level <= _WORTH_SAYING:
+        return []
+    ask = f" Are {_stated(d)} right?" if not _shown(d) and level > _WORTH_ASKING else ""
+    return [f"The level is off ({_level(d)}), within what gain, blade angle and solver allow; no cause shows.{ask}"]
 
 
 def _of_loads(d: Diagnosis) -> list[str]:
@@ -262,13 +317,14 @@ def _next(d: Diagnosis) -> list[str]:
     step = d.next
     if not step.text:
         return []
-    cost = ""
+    tells = [step.tells] if step.tells else []
     if step.minutes and step.gain:
-        cost = f" About {step.minutes:.0f} minutes; expected to settle {step.gain:.0%} of what is open."
+        tells += [f"about {step.minutes:.0f} minutes", f"expected to settle {step.gain:.0%} of what is open"]
+    why = f" ({', '.join(tells)})" if tells else ""
     case = "if nothing is wrong with it" if step.kind in ("mend", "case") else "without such a reference"
     other = [] if step.otherwise is None or step.kind == "run" else [f"  {case}: {step.otherwise.text}"]
     unless = [f"  if {title_of(step.checks)} is ruled out:"] if step.checks and step.commands else []
-    return [f"Next: {step.text}{step.tells}.{cost}", *unless, *(f"  {c}" for c in step.commands), *other]
+    return [f"Next: {step.text}{why}.", *unless, *(f"  {c}" for c in step.commands), *other]
 
 
 def _not_tried(d: Diagnosis) -> list[str]:
@@ -285,61 +341,58 @@ def headline(d: Diagnosis) -> str:
     said = d.said
     if said.verdict == "none":
         return _agreement(d)
+    change = _moved(d)
     if said.verdict in CLAIMS:
-        moved = ", ".join(f"{name} {share(v)}" for name, v in _ratios(d))
-        against = f" ({moved} against the reference)" if moved else ""
-        stand = " in the stand, not the air" if said.verdict == "sensor" else ""
-        what = _of_class(d) if said.verdict == "class" else f"Cause found{stand}: {_both(d, said.effects, True)}"
-        return f"{what}{against}{_in_both(d)}."
+        sets, against = said.sets or (said.effects,), f"{change} against the reference" if change else ""
+        against += _in_both(d)
+        return say.claimed(said.verdict, said.probability, sets, _ways(d), lambda i: _title(d, i), said.beside, against)
     if said.verdict == "insufficient" and (other_rotor.foreign(d.problem) or other_rotor.doubted(d.problem, said)):
         return f"These are not the loads of this case ({_off(d)}): check diameter, blades, units and speed first."
     file, wrong, _ = other_rotor.contradiction(d.problem)
     if file and said.verdict == "insufficient" and not _guess(d):  # a duct or a wall may be why it looks impossible
         return f"{file} cannot be right: {wrong}. Mend that before any cause is looked for."
-    what = _from_reference(d) or f"Recording and model differ ({_off(d)})"
-    shown = f"but these readings do not show why{_guess(d)}"
-    why = "and no effect in the library explains it" if said.verdict == "unknown" else shown
-    return f"{what[0].upper()}{what[1:]}, {why}."
+    unknown, start = said.verdict == "unknown", say.something(d.found.probability)
+    if not change:
+        why = "and no effect in the library explains it" if unknown else "but these readings do not show why"
+        return f"Recording and model differ ({_off(d)}), {why}."
+    if not unknown and said.why.startswith(SPREAD):
+        where = "whether anything changed from the reference"
+        return f"These readings cannot say {where} ({change}); two runs may differ by as much."
+    where = "in the drive, not in the loads" if said.by == "drive" else "from the reference"
+    why = "no listed cause explains it" if unknown else "these readings do not show what"
+    return f"{start} {where} ({change}), and {why}."
+
+
+def _moved(d: Diagnosis) -> str:
+    """What changed from the reference, by how much; "" where that was not compared."""
+    change = _change(d)
+    return "" if change is None else say.moved(change.ratios, d.said.by == "drive") or say.moved(change.ratios)
 
 
 def _agreement(d: Diagnosis) -> str:
     """How far recording and model, or reference, agree where there is no cause."""
-    if not d.problem.free.all():
-        apart = _from_reference(d) or "the recording differs from the reference"
-        return f"No cause above {100.0 * LEAST:g} %: {apart}, no more than runs do; from the model fitted to the " \
-               f"reference, {_off(d)}."  # fmt: skip
+    if _shown(d):
+        change = _moved(d)
+        apart = f"{change} against the reference" if change else f"{_off(d)} from the model fitted to the reference"
+        return f"No change beyond what two runs differ by ({apart}); no cause above {100.0 * LEAST:g} %."
     if max(map(abs, d.problem.level.values()), default=0.0) > LEVEL:
         allowed = "within the uncertainty of calibration, blade and solver; no cause"
         return f"Recording and model differ ({_off(d)}), {allowed}."
     return "Recording and model agree within noise, calibration and the uncertainty of the model."
 
 
-def _of_class(d: Diagnosis) -> str:
-    said = d.said
-    titles = [_title(d, i) for i in said.effects]
-    if said.beside:
-        return f"Cause found: {titles[0]}. Possibly also: {' or '.join(titles[1:])}"
-    if len(said.sets) > 1:
-        each = [" / ".join(_title(d, i) for i in s) for s in said.sets]
-        return f"Two causes: {' and '.join(f'one of ({w})' if ' / ' in w else w for w in each)}"
-    if len(titles) > _A_GROUP:
-        return f"{len(titles)} causes look alike in these readings: {families(said.effects)}"
-    first, *others = _ways(d)
-    lead = f"{_both(d, first, not first.pair)}, probability {d.found.probability.get(first, 0.0):.2f}"
-    if len(others) > 1:  # each with its own probability further down
-        return f"The cause is {lead}, or one of {len(others)} others that these readings cannot distinguish from it"
-    return f"The cause is {lead}, or {_both(d, others[0])}; these readings cannot distinguish them"
-
-
-def _ways(d: Diagnosis) -> list[Explanation]:
+def _ways(d: Diagnosis) -> list[say.Way]:
     """What a class stands for, the likeliest first."""
     P = d.found.probability
-    return ways(d.said.effects, sorted(P, key=lambda k: -P[k]))
+    return [say.Way(_both(d, k), P.get(k, 0.0)) for k in ways(d.said.effects, sorted(P, key=lambda k: -P[k]))]
 
 
-def _both(d: Diagnosis, what: Iterable[str], sized: bool = False) -> str:
-    """Titles of the effects that an explanation has at work together."""
-    return " and ".join(_title(d, i, sized) for i in what)
+def _both(d: Diagnosis, what: Explanation) -> str:
+    """Titles of the effects that an explanation has at work together, with their sizes."""
+    found = d.parameters if what == d.decision.leading else {}
+    if not found and what.ids and all(i in d.found.spans for i in what):
+        found = fitting.intervals(d.found, what)
+    return " and ".join(titled(i, found.get(i, {}), full_scale(d)) for i in what)
 
 
 def _off(d: Diagnosis) -> str:
@@ -356,59 +409,37 @@ def _in_both(d: Diagnosis) -> str:
     return f"; the case leaves {which} out, and the reference shows it as well"
 
 
-def _guess(d: Diagnosis) -> str:
-    """Title of the likeliest effect, where it is likely enough to be worth a look."""
+def _guess(d: Diagnosis) -> bool:
+    """Whether the likeliest effect is likely enough to be worth a look."""
     chance = d.found.probability.get(Explanation.of(*d.best.ids), 0.0) if d.best.ids else 0.0
-    if chance < max(_GUESS, d.found.probability[UNKNOWN], d.found.probability[NONE]):
-        return ""
-    return f"; {' and '.join(title_of(i) for i in d.best.ids)} is likeliest ({chance:.2f}), too little to be named"
-
-
-def _ratios(d: Diagnosis) -> list[tuple[str, float]]:
-    """Loads of the recording over those of the reference at equal speed, less 1; none where they were not compared."""
-    if d.change is None:
-        return []
-    of = d.change.loads_by_name.values()
-    return [(WORD[c.channel] if c.channel == POWER else c.name, d.change.ratios[c.channel].ratio - 1.0) for c in of]
-
-
-def _from_reference(d: Diagnosis) -> str:
-    """What the recording differs from the reference by, in words."""
-    words = " and ".join(f"{name} by {share(v)}" for name, v in _ratios(d))
-    return f"the recording differs from the reference ({words} at equal speed)" if words else ""
+    return chance >= max(_GUESS, d.found.probability[UNKNOWN], d.found.probability[NONE])
 
 
 def text(d: Diagnosis, details: bool = False, lead: str = "") -> str:
     """The answer in twelve lines after a ``lead``; with ``details`` all sentences, and the tables behind them."""
-    first, *rest = explanation(d)
-    last = _not_tried(d)  # it explains little and takes lines
-    named = f" {', '.join(d.said.effects)}" if d.said.effects else ""
-    out = [*textwrap.wrap(f"{lead} {first}".strip(), 110), f"verdict: {d.said.verdict}{named}"]
-    # a command stays in one line, to be copied
-    shown = {line: [f"  {line}"] if line.startswith("  ") else _wrapped(line) for line in rest if line not in last}
+    said = told(d)
+    out = [*say.wrapped(f"{lead} {said.first}".strip(), "", ""), say.verdict_line(d.said.verdict, d.said.effects)]
+    body = [*said.seen, *said.causes, *said.against]
     if not details:
-        shown = _few(shown, _next(d), _LINES - len(out))
-    out += [line for wrapped in shown.values() for line in wrapped]
+        step = sum(len(say.wrapped(words)) for words in said.step)
+        body = _few(body, [*_left_open(d), *said.causes], _LINES - len(out) - step)
+    lines = [*body, *(said.details if details else []), *said.step]
+    out += [line for words in lines for line in say.wrapped(words)]
     if details:
-        out += [*_tables(d), *(f"  note: {note}" for note in d.problem.notes), *map("\n".join, map(_wrapped, last))]
+        out += [*_tables(d), *(f"  note: {note}" for note in d.problem.notes)]
+        out += [line for words in said.last for line in say.wrapped(words)]
     return "\n".join(out)
 
 
-def _wrapped(words: str) -> list[str]:
-    return textwrap.wrap(words, 110, initial_indent="  ", subsequent_indent="    ")
-
-
-def _few(shown: Mapping[str, list[str]], steps: Sequence[str], most: int) -> dict[str, list[str]]:
-    """First remark on the files, the next steps, and of the other sentences those that fit into ``most`` lines."""
-    warned = [line for line in shown if line.startswith("Before any physics: ")][:1]
-    sure = {*warned, *steps}
-    left, told = most - sum(len(wrapped) for line, wrapped in shown.items() if line in sure), {}
-    for line, wrapped in shown.items():
-        if line in sure:
-            told[line] = wrapped
-        elif not line.startswith(_DETAILS) and len(wrapped) <= left:
-            told[line], left = wrapped, left - len(wrapped)
-    return told
+def _few(body: list[str], sure: list[str], most: int) -> list[str]:
+    """Sentences that fit into ``most`` lines, some of them in any case."""
+    left, kept = most - sum(len(say.wrapped(words)) for words in sure), []
+    for words in body:
+        lines = 0 if words in sure else len(say.wrapped(words))
+        if lines <= left or words in sure:
+            kept.append(words)
+            left -= lines
+    return kept
 
 
 def _tables(d: Diagnosis) -> list[str]:

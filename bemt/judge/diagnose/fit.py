@@ -73,6 +73,11 @@ def intervals(found: Evidence, what: Explanation, share: float = 0.9) -> dict[st
     return {i: _marginals(found, i, p, share) for i, p in weights(found, what).items()}
 
 
+def flat(what: Explanation, sizes: Sizes) -> dict[str, Size]:
+    """Parameters of an explanation by name, those of a pair with their effect in front."""
+    return {f"{i}.{k}" if what.pair else k: v for i, own in sizes.items() for k, v in own.items()}
+
+
 def weights(found: Evidence, what: Explanation) -> dict[str, Array]:
     """Posterior probability of every setting of the effects of an explanation. [1]"""
     ids = tuple(what)

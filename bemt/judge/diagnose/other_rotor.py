@@ -7,7 +7,7 @@ whose physics was left out: that question comes before the physics, with the lik
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -113,6 +113,11 @@ def foreign(problem: Problem) -> bool:
 
 def _suspicious(found: dict[str, float]) -> bool:
     return any(not 1.0 / FACTOR < abs(found[c]) < FACTOR for c in CHANNELS[:2] if c in found)
+
+
+def unlike(off: Mapping[str, float]) -> bool:
+    """Whether loads, over those of the case less 1, are farther off than those of the right rotor are."""
+    return any(v <= -1.0 or abs(math.log1p(v)) > 2.0 * _OFF for v in off.values())
 
 
 def suspects(problem: Problem) -> list[Suspect]:
@@ -359,15 +364,18 @@ def finding(problem: Problem) -> str:
         return f"at one speed the readings differ, {told}: what changes between them is not recorded" if told else ""
     turned = {c: " of the other sign," if v < 0.0 else "" for c, v in found.items()}
     off = " and ".join(f"{names[c]} is{turned[c]} {number_text(abs(v), 3)} times" for c, v in found.items())
-    ranked = "; ".join(f"{k}. {s.words}" for k, s in enumerate(suspects(problem)[:_SHOWN], 1))
-    return f"{off} what the case gives. Is it this rotor? Most likely: {ranked}"
+    return f"{off} what the case gives. Is it this rotor? Most likely: {nearest_slips(problem)}"
+
+
+def nearest_slips(problem: Problem) -> str:
+    """Slips that would explain the level of the loads, the likeliest first, in words."""
+    return "; ".join(f"{k}. {s.words}" for k, s in enumerate(suspects(problem)[:_SHOWN], 1))
 
 
 def to_mend(problem: Problem) -> str:
     """What comes before any run: whose rotor it is, or what cannot be so; "" where nothing is wrong."""
     if _suspicious(levels(problem)):
-        slips = "; ".join(f"{k}. {s.words}" for k, s in enumerate(suspects(problem)[:_SHOWN], 1))
-        return f"check that the case describes this rotor; other explanations for the loads: {slips}"
+        return "check that the case describes this rotor, and look at the file"
     file, _, correction = contradiction(problem)
     return f"correct {file} before any run: {correction}" if file else ""
 

@@ -98,7 +98,8 @@ class Plan(Answered):
         for group in c.classes():
             out.append(f"  cannot be distinguished: {', '.join(group)}")
         if self.added is not None:
-            out.append(f"  to add: {self.added.text}{self.added.tells}")
+            tells = f" ({self.added.tells})" if self.added.tells else ""
+            out.append(f"  to add: {self.added.text}{tells}")
         if every:
             out += [f"  not visible: {i}: {why}" for i, why in self.absent.items()]
         elif unseen or self.absent:

@@ -39,8 +39,8 @@ if TYPE_CHECKING:
     from bemt.judge.diagnose.posterior import Evidence
 
 REFERENCE = (
-    "a reference run: the same rotor, stand and points without the suspected cause (before the change, or another "
-    "rotor of this type that is known to be right)"
+    "a reference run: the same stand and points with the rotor before the change, or with another one of this type "
+    "that is known to be right"
 )
 """The run that settles most: it shows how far model and stand differ anyway."""
 
@@ -55,6 +55,7 @@ _DAYS = 0.03, 0.15
 LEVEL = 0.1
 """A load off the case by more than this, at usual, is no agreement, even if calibration may be that far off [1]."""
 
+_NOTHING = "nothing"  # what a run separates an effect from where no cause is the rival
 _POINTS = 4
 _FASTER = 1.1  # A run less fast than that shows little that the recording does not: declared [1]
 # Speed over the highest below which a controller stalls and a cell reads a twenty-fifth of its load: declared [1]
@@ -126,11 +127,9 @@ class Suggestion:
 
     @property
     def tells(self) -> str:
-        """What it separates and by how much, in words."""
-        if not self.separates:
-            return ""
-        both = f"{self.after:.1f} instead of {self.before:.1f}"
-        return f" (tells {' from '.join(map(title_of, self.separates))} at {both} standard deviations)"
+        """What it separates, in words; "" for nothing."""
+        names = ("no cause" if k == _NOTHING else title_of(k) for k in self.separates)
+        return f"tells {' from '.join(names)}" if self.separates else ""
 
     def document(self) -> Mapping[str, object]:
         """Plain values for JSON."""
@@ -360,7 +359,7 @@ def suggest(found: Evidence, rivals: Sequence[Rival], unknown: float = 0.0, refe
     able.sort(key=lambda c: -c.gain / c.minutes)
     certain = before >= _ENOUGH and not reference
     # without doubt there is no rival to rule out
-    names = [r.effect or "nothing" for r in rivals[: 2 if total >= _WORTH else 1]]
+    names = [r.effect or _NOTHING for r in rivals[: 2 if total >= _WORTH else 1]]
     looked = look(names, found.problem.parts[0].record)
     # where no run is able to, one that tells only the others apart is better than nothing
     runs = [c for c in worth if c.kind == "run"]
@@ -386,7 +385,7 @@ def _choices(
 
     hyper, part = found.states[0].hyper, found.problem.parts[0]
     effect = [None if not r.effect else effect_of(r.effect, dict(r.settings)) for r in rivals]
-    names = tuple(r.effect or "nothing" for r in rivals[:2])
+    names = tuple(r.effect or _NOTHING for r in rivals[:2])
     p = np.array([max(r.probability, _LEAST) for r in rivals])
     share = p / (p.sum() + unknown)
     doubt = np.outer(share, share) - np.diag(share**2)

@@ -11,6 +11,7 @@ from bemt.base.page import FIRST, Cell, num, table
 from bemt.base.tables import number_text
 from bemt.data.recordings.audit import Audit
 from bemt.data.recordings.grids import LOADS, LoadStudy
+from bemt.physics.effects import catalogue
 from bemt.results.report.book import CasePage, Diagnosed, Part, Picture, ShownParameter, picture
 from bemt.results.report.plot import COLOURS, DASHES, Plot, Trace, figure
 from bemt.results.sweep.rows import Comparison, Result, Row, State, beside
@@ -253,7 +254,7 @@ def study_parts(studies: Sequence[Mapping[str, Any]]) -> list[Part]:
 
 KIND = {"none": "same", "named": "differs", "class": "doubtful", "sensor": "differs", "unknown": "unknown",
         "insufficient": "unknown"}  # fmt: skip
-BADGE = {"none": "no cause shows", "named": "cause", "class": "one of", "sensor": "sensor",
+BADGE = {"none": "no cause shows", "named": "cause", "sensor": "the stand",
          "unknown": "cause not in the library", "insufficient": "cause not known"}  # fmt: skip
 """Words of the badge; the verdict alone reads as if nothing agreed."""
 RANKED, LEAST = 8, 1e-3
@@ -275,13 +276,22 @@ def _parameters(told: Mapping[str, ShownParameter]) -> str:
     return "; ".join(words)
 
 
+def _title(effect: str) -> str:
+    """What an effect is called; an explanation may be several."""
+    known = catalogue()
+    return " and ".join(known[k].title if k in known else k for k in effect.split("+"))
+
+
 def diagnosis_verdict(item: Diagnosed) -> tuple[str, str, str]:
     """Give kind and words of a badge, and sentences."""
     d = item.told
-    said, effects = d.verdict or "unknown", ", ".join(d.effects)
+    said, effects = d.verdict or "unknown", ", ".join(map(_title, d.effects))
     why = d.explanation.partition(" Not tried: ")[0].partition(" Next: ")[0]
-    word = BADGE.get(said, said)
-    return KIND.get(said, "unknown"), f"{word}: {effects}" if effects else word, why
+    if said == "class" and d.ranking:
+        word = f"one of {len(d.effects)}, likeliest {_title(d.ranking[0].effect)}"
+    else:
+        word = f"{BADGE.get(said, said)}{f': {effects}' if effects else ''}"
+    return KIND.get(said, "unknown"), word, why
 
 
 def page_verdict(page: CasePage) -> tuple[str, str, str]:
@@ -319,10 +329,10 @@ def diagnosis_parts(item: Diagnosed, first: bool = True) -> list[Part]:
     at = d.location
     if at.channel and d.verdict != "none":
         low, high, size, z = (num(v, 3).text for v in (at.low, at.high, at.size, at.z))
-        where = f"{at.channel} where {at.variable or '?'} is {low} to {high}"
-        out.append(("words", f"Located in {where} (size {size}, z {z})."))
+        where = f"in {at.channel}, where {at.variable or '?'} is {low} to {high}"
+        out.append(("words", f"Largest mismatch {where}: {size} of the largest value, {z} standard deviations in all."))
     rows = [
-        [r.effect, p, _parameters(r.parameters)]
+        [_title(r.effect), p, _parameters(r.parameters)]
         for r in d.ranking[:RANKED]
         if (p := num(r.probability, 3)).value is None or p.value >= LEAST
     ]
@@ -331,13 +341,13 @@ def diagnosis_parts(item: Diagnosed, first: bool = True) -> list[Part]:
     out.append(("table", table(FIT_HEAD, fits)))
     classes = [c for c in d.classes if len(c) > 1]
     if classes:
-        told = "; ".join(map(" = ".join, classes[:12]))
-        out.append(("words", f"Not distinguished by these data: {told}."))
+        told = "; ".join(" or ".join(map(_title, one)) for one in classes[:12])
+        out.append(("words", f"At their usual size such points cannot tell apart: {told}."))
     step = d.next_measurement
     if step.text:
         out.append(("words", f"Next measurement: {step.text}."))
         out += [("command", command) for command in step.commands]
-    absent = [f"{effect}: {reason}" for effect, reason in d.not_tried.items()]
+    absent = [f"{_title(effect)}: {reason}" for effect, reason in d.not_tried.items()]
     out.append(("more", (f"{len(absent)} effects not tried, and why", [("list", absent)])) if absent else ("list", []))
     rest = [picture(name, data) for name, data in item.figures if not name.startswith(FIRST)]
     return [*out, ("figures", rest)]

@@ -197,7 +197,7 @@ def summary(book: Book) -> str:
             new = [said for said in sentences(why) if said not in page_verdict(page)[2]]
             short = [said for k, said in enumerate(new) if len(" ".join(new[: k + 1])) <= _MOST]
             why = plain_markdown(" ".join(short or new), _MOST)
-            out += ["", f"Diagnosis: {plain_markdown(word, 80)}. {why}".strip()]
+            out += ["", f"Diagnosis: {plain_markdown(word, 140)}. {why}".strip()]
         out += [f"- {plain_markdown(fault)}" for fault in r.faults[:20]]
         out += ["", *(f"Note: {plain_markdown(note)}" for note in page.problems)] if page.problems else []
     return "\n".join(out) + "\n"
