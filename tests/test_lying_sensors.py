@@ -81,3 +81,12 @@ def test_what_is_claimed_is_the_fault_or_cannot_be_told_from_it(
     found = sum(bool(said) and FAULTS[k[2]][0] in said for k, said in mine.items())
     assert len(wrong) <= most_wrong, wrong
     assert found >= 0.8 * len(mine), {k: said for k, said in mine.items() if not said}
+
+
+def test_a_count_and_a_unit_are_named_by_their_ratio_though_shapes_of_a_blade_come_near(
+    answers: dict[tuple[str, str, str], set[str] | None],
+) -> None:
+    exact = {
+        k: said for k, said in answers.items() if k[0] == "compare" and FAULTS[k[2]][0] in ("rpm_scale", "unit_slip")
+    }
+    assert sum(said == {FAULTS[k[2]][0]} for k, said in exact.items()) >= 0.8 * len(exact), exact

@@ -8,7 +8,7 @@ effect's law is a few more columns of that covariance, by Woodbury.  What else i
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import combinations
@@ -359,6 +359,11 @@ def _pairs(bank: _Bank, state: State) -> None:
         state.log_z[pair] = none + float(log_sum(value.ravel()))
 
 
+def _better(pair: Explanation, log_z: Mapping[Explanation, float]) -> Explanation:
+    """Effect of a pair that has the larger evidence alone."""
+    return max((Explanation.of(i) for i in pair.ids), key=lambda i: log_z[i])
+
+
 def _posterior(
     states: Sequence[State], before: dict[Explanation, float], rough: Collection[str], stated: Collection[str]
 ) -> dict[Explanation, float]:  # fmt: skip
@@ -368,6 +373,7 @@ def _posterior(
 
     Evidence between ``rough`` laws is tempered: they are off by a share of what they explain, so that they are told
     apart by no less than that share of the log odds (a power likelihood, as for any model that is known to be wrong).
+    A pair in which a law adds too little to an exact cause is no evidence of any law.
     """
     weight = np.array([np.log(s.hyper.weight) for s in states])
 
@@ -376,17 +382,20 @@ def _posterior(
 
     log_z = {k: together([s.log_z[k] for s in states]) for k in states[0].log_z}
     plain = dict(log_z)
-    if near := {k: v for k, v in log_z.items() if k.ids & set(rough)}:
+    near = {
+        k: v for k, v in log_z.items() if k.ids & set(rough) and (not k.pair or v >= plain[_better(k, plain)] + EARNED)
+    }
+    if near:
         top = max(near.values())
         power = EARNED / max(EARNED, min(effect_base.FORM) * (top - log_z[NONE]))
-        log_z |= {k: top - power * (top - v) for k, v in near.items() if len(k) == 1}
+        log_z |= {k: top - power * (top - v) for k, v in near.items() if not k.pair}
     small = {k: together([s.small[k] for s in states]) for k in states[0].small}
     log_p = [log_z[k] + before[k] for k in log_z] + [v + before[k] for k, v in small.items()]
     p = shares(log_p)
     out = dict(zip(log_z, p.tolist(), strict=False))
     out[NONE] += float(np.sum(p[len(log_z) :]))
     for k in [k for k in out if k.pair]:
-        better = max((Explanation.of(i) for i in k.ids), key=lambda i: plain[i])
+        better = _better(k, plain)
         if plain[k] < plain[better] + EARNED:
             out[better] += out[k]
             out[k] = 0.0
