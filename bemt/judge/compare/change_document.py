@@ -329,8 +329,10 @@ def _of_files(doc: ComparedRuns) -> list[str]:
     wrong, warned = [], []
     for note in doc.notes:
         if note.startswith(recordings.ERROR_IN[0]):
-            where, kind, evidence = note.removeprefix(recordings.ERROR_IN[0]).split(": ", 2)
-            wrong.append(say.Wrong(where, kind, evidence.removeprefix("thrust_N: ").removeprefix("torque_Nm: ")))
+            where, kind, words = note.removeprefix(recordings.ERROR_IN[0]).split(": ", 2)
+            wrong.append(
+                say.Wrong(where, kind, words.removeprefix("thrust_N: ").removeprefix("torque_Nm: "), channel=words)
+            )
         elif note.startswith(recordings.ERROR_IN):
             warned.append(f"{note[0].upper()}{note[1:]}.")
     wrong = [w._replace(both=any(w.kind == v.kind and w.where != v.where for v in wrong)) for w in wrong]

@@ -89,7 +89,8 @@ def claimed(
     elif ways[0].probability >= _LIKELIER:
         told = f"Most likely {ways[0].title}, probability {odds(ways[0].probability)}"
     else:  # little is known of the cause
-        alike = f"one of {len(ways)} causes that these readings cannot tell apart, likeliest {ways[0]}"
+        first = f"likeliest {ways[0].title}, probability {odds(ways[0].probability)}"
+        alike = f"one of {len(ways)} causes that these readings cannot tell apart, {first}"
         told, change = f"{change}: {alike}" if change else alike, ""
     return f"{told[0].upper()}{told[1:]}{f'; {change}' if change else ''}."
 
@@ -121,7 +122,7 @@ def likeliest(P: Mapping[Explanation, float], title: Callable[[Explanation], str
 
     >>> gain = Explanation.of("thrust_gain")
     >>> likeliest({NONE: 0.54, gain: 0.3, UNKNOWN: 0.16}, str, "no change")
-    ['Likeliest: no change 0.54; thrust_gain 0.30; something that is not in the library 0.16.']
+    ['Likeliest (probability): no change 0.54; thrust_gain 0.30; something that is not in the library 0.16.']
     """
     words = {NONE: nothing, UNKNOWN: "something that is not in the library",
              DOUBT: "another rotor, unit or file than stated"}  # fmt: skip
@@ -131,7 +132,7 @@ def likeliest(P: Mapping[Explanation, float], title: Callable[[Explanation], str
             break
         told.append(Way(words[k] if k in words else title(k), p))
         causes += bool(k.ids)
-    return [f"Likeliest: {'; '.join(map(str, told))}."] if causes else []
+    return [f"Likeliest (probability): {'; '.join(map(str, told))}."] if causes else []
 
 
 def moved(ratios: Mapping[str, Ratio], drive: bool = False) -> str:
@@ -216,6 +217,7 @@ class Wrong(NamedTuple):
     evidence: str  # Numbers that show it
     correction: str = ""  # What would make it right
     both: bool = False  # Whether the recording that it is compared with shows the same
+    channel: str = ""
 
 
 def of_files(found: Sequence[Wrong], cause: Mapping[str, Found]) -> list[str]:
@@ -227,7 +229,7 @@ def of_files(found: Sequence[Wrong], cause: Mapping[str, Found]) -> list[str]:
     for wrong in found:
         if wrong.both:
             shared.setdefault(wrong.kind, f"In both files, and so no change: {wrong.evidence}.")
-        elif _explains(cause, wrong.evidence):
+        elif _explains(cause, f"{wrong.channel} {wrong.evidence}"):
             support.append(f"It explains what cannot be: {'; '.join(wrong.evidence.split('; ')[:2])}.")
         else:
             rest.append(f"In {wrong.where}: {'; '.join(filter(None, (wrong.evidence, wrong.correction)))}.")
