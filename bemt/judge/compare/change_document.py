@@ -17,7 +17,7 @@ from bemt.base.tables import or_null, text_table
 from bemt.base.unit_errors import speed_ratios
 from bemt.judge.compare import recordings
 from bemt.judge.compare import sentences as say
-from bemt.judge.compare.drive_laws import FAMILY, Judgement, check_of, title_of
+from bemt.judge.compare.drive_laws import FAMILY, SUPPLY, Judgement, check_of, title_of
 from bemt.judge.compare.matched import LOADS, OVER_COMMAND, WITHOUT_SPEED
 from bemt.judge.compare.recordings import IN_WIND, NO_SPEED, NOTHING_SHARED, OTHER_STAND, REVERSED, RunChange
 from bemt.judge.compare.selection import Invocation
@@ -118,10 +118,11 @@ def _lacking(change: RunChange, asked: Invocation) -> tuple[str, str] | None:
 def _quickest_checks(change: RunChange, asked: Invocation) -> tuple[str, str, str]:
     """Checks that find the cause soonest, one of each family, or the run of A again; and the cause looked for first."""
     said = change.leading
-    members = [k for k in said.effects if check_of(k)]
-    order = checks_by_worth(said.ranked, minutes("reference", len(change.a.points)))
+    read = SUPPLY.ids if "voltage_V" in change.ratios else frozenset[str]()  # which needs no check
+    members = [k for k in said.effects if check_of(k) and k not in read]
+    order = [k for k in checks_by_worth(said.ranked, minutes("reference", len(change.a.points))) if k not in read]
     firsts: dict[str, str] = {}
-    causes = [k for k in said.ranked if k.ids]
+    causes = [k for k in said.ranked if k.ids and not k.ids & read]
     if causes and next(iter(said.ranked)) != NONE:
         # what is nearly as likely as the likeliest goes first, and before it that one where anybody would see it
         near = {i for k in causes if said.ranked[k] >= _NEARLY * said.ranked[causes[0]] for i in k}
@@ -364,6 +365,8 @@ def _of_drive(doc: ComparedRuns) -> list[str]:
     drive = doc.subsystems.get("drive")
     if drive and not set(drive.effects) <= {*doc.effects}:
         return [f"Drive: {', '.join(map(title_of, drive.effects))}."]
+    if drive and drive.rule.startswith(_TOLD) and drive.effects != doc.effects:
+        return [f"Drive: {drive.rule}."]
     if drive and doc.verdict != "none" and drive.verdict == "none":
         moved = any(r.kind in OVER_COMMAND and not r.low95 < 1.0 < r.high95 for r in doc.ratios.values())
         return [f"Drive: no change beyond {'what load, voltage or a miscount explains' if moved else 'scatter'}."]
