@@ -377,7 +377,7 @@ def _causes(doc: ComparedRuns) -> list[str]:
     """What else it may be, or what is likeliest; the reason where there is one."""
     if doc.verdict == "class":
         return say.others(_ways(doc), doc.sets, partial(_title, doc), _posterior(doc))
-    if doc.verdict == "insufficient" and not doc.rule.endswith((IN_WIND, NOTHING_SHARED, NO_SPEED)):
+    if doc.verdict == "insufficient" and not doc.rule.endswith((IN_WIND, NOTHING_SHARED, NO_SPEED, OTHER_STAND)):
         return say.likeliest(_posterior(doc), lambda k: _title(doc, str(k)), say.NO_CHANGE)
     told = doc.rule.startswith((ON_ONE, *recordings.AS_RECORDED)) or doc.rule == REVERSED
     return [] if told or doc.verdict not in CLAIMS else [f"{doc.rule[0].upper()}{doc.rule[1:]}."]
