@@ -365,7 +365,7 @@ def _of_drive(doc: ComparedRuns) -> list[str]:
     drive = doc.subsystems.get("drive")
     if drive and not set(drive.effects) <= {*doc.effects}:
         return [f"Drive: {', '.join(map(title_of, drive.effects))}."]
-    if drive and drive.rule.startswith(_TOLD) and drive.effects != doc.effects:
+    if drive and drive.rule.startswith(recordings.VOLTS_AS_RECORDED) and drive.effects != doc.effects:
         return [f"Drive: {drive.rule}."]
     if drive and doc.verdict != "none" and drive.verdict == "none":
         moved = any(r.kind in OVER_COMMAND and not r.low95 < 1.0 < r.high95 for r in doc.ratios.values())

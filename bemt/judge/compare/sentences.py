@@ -229,7 +229,7 @@ def of_files(found: Sequence[Wrong], cause: Mapping[str, Found]) -> list[str]:
         if wrong.both:
             shared.setdefault(wrong.kind, f"In both files, and so no change: {wrong.evidence}.")
         elif _explains(cause, f"{wrong.channel} {wrong.evidence}"):
-            support.append(f"It explains what cannot be: {'; '.join(wrong.evidence.split('; ')[:2])}.")
+            support.append(f"It explains what cannot be in {wrong.where}: {'; '.join(wrong.evidence.split('; ')[:2])}.")
         else:
             rest.append(f"In {wrong.where}: {'; '.join(filter(None, (wrong.evidence, wrong.correction)))}.")
     return [*support[:1], *rest, *shared.values()]
