@@ -142,7 +142,7 @@ def test_the_cause_is_named_or_in_the_class(
     [
         (scaled(thrust_N=1.0 / 4.4482216152605), r"wrong unit or sign \(thrust in lbf\)"),
         (_zero, r"zero offset of the thrust cell \(\+[23]\.?\d* % of the largest reading, (0\.\d+) N\)"),
-        (scaled(rpm=7.0), r"wrong speed of rotation \(x7: revolutions of 7 pole pairs\)"),
+        (scaled(rpm=7.0), r"wrong speed of rotation \(x7: electrical revolutions of 7 pole pairs\)"),
     ],
     ids=["unit", "zero", "count"],
 )

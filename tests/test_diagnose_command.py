@@ -587,7 +587,7 @@ def test_findings_of_several_files_name_their_file_first(tmp_path: Path, capsys:
     assert "2.csv: warning: sign_flipped (thrust_N): " in " ".join(own)
     assert all(f.startswith("2.csv: ") for f in own)
     evidence = odd.partition("(thrust_N): ")[2].partition(". Correction: ")[0]
-    assert f" In 2.csv: {evidence}" in answer["explanation"], answer["explanation"]
+    assert f"It explains what cannot be in 2.csv: {evidence}" in answer["explanation"], answer["explanation"]
 
 
 def test_real_recordings_of_one_propeller_have_one_unit(shared_data: Path, tmp_path: Path) -> None:

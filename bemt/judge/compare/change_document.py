@@ -17,7 +17,7 @@ from bemt.base.tables import or_null, text_table
 from bemt.base.unit_errors import speed_ratios
 from bemt.judge.compare import recordings
 from bemt.judge.compare import sentences as say
-from bemt.judge.compare.drive_laws import FAMILY, Judgement, check_of, title_of
+from bemt.judge.compare.drive_laws import FAMILY, SUPPLY, Judgement, check_of, title_of
 from bemt.judge.compare.matched import LOADS, OVER_COMMAND, WITHOUT_SPEED
 from bemt.judge.compare.recordings import IN_WIND, NO_SPEED, NOTHING_SHARED, OTHER_STAND, REVERSED, RunChange
 from bemt.judge.compare.selection import Invocation
@@ -118,10 +118,11 @@ def _lacking(change: RunChange, asked: Invocation) -> tuple[str, str] | None:
 def _quickest_checks(change: RunChange, asked: Invocation) -> tuple[str, str, str]:
     """Checks that find the cause soonest, one of each family, or the run of A again; and the cause looked for first."""
     said = change.leading
-    members = [k for k in said.effects if check_of(k)]
-    order = checks_by_worth(said.ranked, minutes("reference", len(change.a.points)))
+    read = SUPPLY.ids if "voltage_V" in change.ratios else frozenset[str]()  # which needs no check
+    members = [k for k in said.effects if check_of(k) and k not in read]
+    order = [k for k in checks_by_worth(said.ranked, minutes("reference", len(change.a.points))) if k not in read]
     firsts: dict[str, str] = {}
-    causes = [k for k in said.ranked if k.ids]
+    causes = [k for k in said.ranked if k.ids and not k.ids & read]
     if causes and next(iter(said.ranked)) != NONE:
         # what is nearly as likely as the likeliest goes first, and before it that one where anybody would see it
         near = {i for k in causes if said.ranked[k] >= _NEARLY * said.ranked[causes[0]] for i in k}
@@ -329,8 +330,10 @@ def _of_files(doc: ComparedRuns) -> list[str]:
     wrong, warned = [], []
     for note in doc.notes:
         if note.startswith(recordings.ERROR_IN[0]):
-            where, kind, evidence = note.removeprefix(recordings.ERROR_IN[0]).split(": ", 2)
-            wrong.append(say.Wrong(where, kind, evidence.removeprefix("thrust_N: ").removeprefix("torque_Nm: ")))
+            where, kind, words = note.removeprefix(recordings.ERROR_IN[0]).split(": ", 2)
+            wrong.append(
+                say.Wrong(where, kind, words.removeprefix("thrust_N: ").removeprefix("torque_Nm: "), channel=words)
+            )
         elif note.startswith(recordings.ERROR_IN):
             warned.append(f"{note[0].upper()}{note[1:]}.")
     wrong = [w._replace(both=any(w.kind == v.kind and w.where != v.where for v in wrong)) for w in wrong]
@@ -362,6 +365,8 @@ def _of_drive(doc: ComparedRuns) -> list[str]:
     drive = doc.subsystems.get("drive")
     if drive and not set(drive.effects) <= {*doc.effects}:
         return [f"Drive: {', '.join(map(title_of, drive.effects))}."]
+    if drive and drive.rule.startswith(recordings.VOLTS_AS_RECORDED) and drive.effects != doc.effects:
+        return [f"Drive: {drive.rule}."]
     if drive and doc.verdict != "none" and drive.verdict == "none":
         moved = any(r.kind in OVER_COMMAND and not r.low95 < 1.0 < r.high95 for r in doc.ratios.values())
         return [f"Drive: no change beyond {'what load, voltage or a miscount explains' if moved else 'scatter'}."]
@@ -372,7 +377,7 @@ def _causes(doc: ComparedRuns) -> list[str]:
     """What else it may be, or what is likeliest; the reason where there is one."""
     if doc.verdict == "class":
         return say.others(_ways(doc), doc.sets, partial(_title, doc), _posterior(doc))
-    if doc.verdict == "insufficient" and not doc.rule.endswith((IN_WIND, NOTHING_SHARED, NO_SPEED)):
+    if doc.verdict == "insufficient" and not doc.rule.endswith((IN_WIND, NOTHING_SHARED, NO_SPEED, OTHER_STAND)):
         return say.likeliest(_posterior(doc), lambda k: _title(doc, str(k)), say.NO_CHANGE)
     told = doc.rule.startswith((ON_ONE, *recordings.AS_RECORDED)) or doc.rule == REVERSED
     return [] if told or doc.verdict not in CLAIMS else [f"{doc.rule[0].upper()}{doc.rule[1:]}."]

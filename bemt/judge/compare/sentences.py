@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from bemt.base.tables import number_text
@@ -82,14 +82,16 @@ def claimed(
         what = " and ".join(title(i) for one in sets for i in one)
         told = f"Cause found{where}: {what}, probability {odds(probability)}"
     elif beside:
-        told = f"Cause found: {title(sets[0][0])}; possibly also {' or '.join(map(title, sets[1]))}"
+        more = " or ".join(map(title, sets[1]))
+        told = f"Cause found: {title(sets[0][0])}, probability {odds(probability)}, and possibly {more}"
     elif len(sets) > 1:
         each = [_either(one, title) for one in sets]
         told = f"Two causes, probability {odds(probability)}: {' and '.join(each)}"
     elif ways[0].probability >= _LIKELIER:
         told = f"Most likely {ways[0].title}, probability {odds(ways[0].probability)}"
     else:  # little is known of the cause
-        alike = f"one of {len(ways)} causes that these readings cannot tell apart, likeliest {ways[0]}"
+        first = f"likeliest {ways[0].title}, probability {odds(ways[0].probability)}"
+        alike = f"one of {len(ways)} causes that these readings cannot tell apart, {first}"
         told, change = f"{change}: {alike}" if change else alike, ""
     return f"{told[0].upper()}{told[1:]}{f'; {change}' if change else ''}."
 
@@ -112,7 +114,8 @@ def others(
     """What else a class may be, each once; of two causes what either may be instead of the one that was said."""
     if len(sets) < 2:
         return [f"It may also be: {'; '.join(map(str, ways[1:]))}."] if len(ways) > 1 else []
-    each = {title(one[0]): [Way(title(i), P.get(Explanation.of(i), 0.0)) for i in one[1:]] for one in sets}
+    share = {i: sum(p for k, p in P.items() if i in k) for one in sets for i in one}
+    each = {title(one[0]): [Way(title(i), share[i]) for i in one[1:]] for one in sets}
     return [f"In place of {first}: {'; '.join(map(str, rest))}." for first, rest in each.items() if len(rest) > 1]
 
 
@@ -121,7 +124,7 @@ def likeliest(P: Mapping[Explanation, float], title: Callable[[Explanation], str
 
     >>> gain = Explanation.of("thrust_gain")
     >>> likeliest({NONE: 0.54, gain: 0.3, UNKNOWN: 0.16}, str, "no change")
-    ['Likeliest: no change 0.54; thrust_gain 0.30; something that is not in the library 0.16.']
+    ['Likeliest (probability): no change 0.54; thrust_gain 0.30; something that is not in the library 0.16.']
     """
     words = {NONE: nothing, UNKNOWN: "something that is not in the library",
              DOUBT: "another rotor, unit or file than stated"}  # fmt: skip
@@ -131,17 +134,14 @@ def likeliest(P: Mapping[Explanation, float], title: Callable[[Explanation], str
             break
         told.append(Way(words[k] if k in words else title(k), p))
         causes += bool(k.ids)
-    return [f"Likeliest: {'; '.join(map(str, told))}."] if causes else []
+    return [f"Likeliest (probability): {'; '.join(map(str, told))}."] if causes else []
 
 
 def moved(ratios: Mapping[str, Ratio], drive: bool = False) -> str:
     """What changed by how much: the loads, or the drive where a cause in it has moved that."""
     kinds = ("speed", "voltage", "electrical") if drive else (*LOADS, *WITHOUT_SPEED)
-    found = {r.kind: (of_what(c, r), r) for c, r in ratios.items()}
-    words, some = (
-        zip(*[found[k] for k in kinds if k in found][:2], strict=True) if found.keys() & {*kinds} else ((), ())
-    )
-    return " and ".join(f"{word} {share}" for word, (share, *_) in zip(words, _intervals(some), strict=True))
+    found = {r.kind: f"{of_what(c, r)} {_interval(r)[0]}" for c, r in ratios.items()}
+    return " and ".join([found[k] for k in kinds if k in found][:2])
 
 
 def seen(ratios: Mapping[str, Ratio], lead: str, drive: bool = False) -> list[str]:
@@ -150,11 +150,11 @@ def seen(ratios: Mapping[str, Ratio], lead: str, drive: bool = False) -> list[st
     loads = {c: r for c, r in ratios.items() if r.kind in kinds}
     if not loads:
         return []
-    first, at = next(iter(loads.values())), WITHOUT_SPEED.get(next(iter(loads.values())).kind, "speed")
-    words = [f"{WORD[c]} {share} ({low} to {high})"
-             for c, (share, low, high) in zip(loads, _intervals(loads.values()), strict=True)]  # fmt: skip
-    where = "" if drive else f" at equal {at}, {'extrapolated to one speed' if first.extrapolated else _range(first)}"
-    return [f"{lead}{where}: {', '.join(words)}; 95 % in brackets.", *_along(loads)]
+    first = next(iter(loads.values()))
+    where = "extrapolated to one speed" if first.extrapolated else _range(first)
+    words = [f"{WORD[c]} {{}} ({{}} to {{}})".format(*_interval(r)) for c, r in loads.items()]
+    place = "" if drive else f" at equal {WITHOUT_SPEED.get(first.kind, 'speed')}, {where}"
+    return [f"{lead}{place}: {', '.join(words)}; 95 % in brackets.", *_along(loads)]
 
 
 def _along(loads: Mapping[str, Ratio]) -> Iterator[str]:
@@ -178,9 +178,9 @@ def of_what(channel: str, r: Ratio) -> str:
     return f"{WORD[channel]} at equal {WITHOUT_SPEED[r.kind]}" if r.kind in WITHOUT_SPEED else WORD[channel]
 
 
-def _intervals(channels: Iterable[Ratio]) -> list[list[str]]:
-    """Change of each channel as measured and the ends of its 95 % interval, in one notation."""
-    return [shares(*(k * r.density_ratio for k in (r.ratio, r.low95, r.high95))) for r in channels]
+def _interval(r: Ratio) -> list[str]:
+    """Change of a channel as measured and the ends of its 95 % interval, in one notation."""
+    return shares(*(k * r.density_ratio for k in (r.ratio, r.low95, r.high95)))
 
 
 def _range(r: Ratio) -> str:
@@ -216,6 +216,7 @@ class Wrong(NamedTuple):
     evidence: str  # Numbers that show it
     correction: str = ""  # What would make it right
     both: bool = False  # Whether the recording that it is compared with shows the same
+    channel: str = ""
 
 
 def of_files(found: Sequence[Wrong], cause: Mapping[str, Found]) -> list[str]:
@@ -227,8 +228,8 @@ def of_files(found: Sequence[Wrong], cause: Mapping[str, Found]) -> list[str]:
     for wrong in found:
         if wrong.both:
             shared.setdefault(wrong.kind, f"In both files, and so no change: {wrong.evidence}.")
-        elif _explains(cause, wrong.evidence):
-            support.append(f"It explains what cannot be: {'; '.join(wrong.evidence.split('; ')[:2])}.")
+        elif _explains(cause, f"{wrong.channel} {wrong.evidence}"):
+            support.append(f"It explains what cannot be in {wrong.where}: {'; '.join(wrong.evidence.split('; ')[:2])}.")
         else:
             rest.append(f"In {wrong.where}: {'; '.join(filter(None, (wrong.evidence, wrong.correction)))}.")
     return [*support[:1], *rest, *shared.values()]

@@ -59,7 +59,8 @@ def in_words(found: Found) -> str:
 def _likeliest(found: Found) -> str:
     """What is likeliest of them, and what is nearly as likely; "" without a factor, and for a factor of 1."""
     each = _values(found)
-    return ", or ".join(words for words, p in each if p > _NEARLY * each[0][1])
+    near = [words for words, p in each if p > _NEARLY * each[0][1]]
+    return ", or ".join([*near[:2], *([f"{len(near) - 2} others"] if len(near) > 2 else [])])
 
 
 def _values(found: Found) -> list[tuple[str, float]]:
@@ -106,10 +107,10 @@ def _miscount(r: SpeedRatio) -> str:
     """The ratio and what makes it.
 
     >>> [_miscount(r) for r in speed_ratios(rarest=0.5) if r.ratio in (7.0, 7.0 / 6.0)]
-    ['x7: revolutions of 7 pole pairs', 'x7/6: 6 pole pairs set instead of 7']
+    ['x7: electrical revolutions of 7 pole pairs', 'x7/6: 6 pole pairs set instead of 7']
     """
     if r.set == 1:
-        return f"x{r.true}: revolutions of {r.true} pole pairs"
+        return f"x{r.true}: electrical revolutions of {r.true} pole pairs"
     if r.true == 1:
         return f"x1/{r.set}: divided twice by {r.set} pole pairs"
     return f"x{r.true}/{r.set}: {r.set} {r.cause} set instead of {r.true}"

@@ -37,7 +37,7 @@ _GUESS = 0.3  # least probability of a guess
 # Level that is said even where no cause shows, and from which on it is asked whether the rotor is that of the case.
 _WORTH_SAYING, _WORTH_ASKING = 0.05, 0.15
 _LINES = 12  # of an answer
-_FINDING = re.compile(r"(.*?): (?:error|warning|note): (\w+) \(.*?\): (.*?)\. Correction: (.*)", flags=re.S)
+_FINDING = re.compile(r"(.*?): (?:error|warning|note): (\w+) \((.*?)\): (.*?)\. Correction: (.*)", flags=re.S)
 _NOTHING = "no cause, only noise and what calibration leaves open"
 
 
@@ -238,7 +238,7 @@ def _files(d: Diagnosis) -> list[str]:
     shared, claim = {m[2] for m in map(_FINDING.fullmatch, known) if m}, d.said.verdict in CLAIMS
     for f in (f for f in problem.findings if f not in known):
         if m := _FINDING.fullmatch(f):
-            wrong.append(say.Wrong(m[1], m[2], m[3], "" if claim else m[4], m[2] in shared))
+            wrong.append(say.Wrong(m[1], m[2], m[4], "" if claim else m[5], m[2] in shared, m[3]))
         elif f != question or not other_rotor.foreign(problem):
             rest.append(f"In the file: {f}.")
     cause = {i: d.parameters.get(i, {}) for i in d.said.leading} if claim else {}
