@@ -20,6 +20,7 @@ from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.page import FIRST
 from bemt.base.tables import json_text, write_atomic
 from bemt.base.units import INCH
+from bemt.data.readers.left_open import meant as left_open
 from bemt.data.readers.left_open import one_step
 from bemt.data.recordings.channels import named
 from bemt.data.recordings.check import OPEN_OR_OUT, check, left_out
@@ -28,7 +29,7 @@ from bemt.data.recordings.shown import between_setups, options_of
 from bemt.data.recordings.stated import IGNORED, filled
 from bemt.judge.compare import drive_laws, one_run, two_runs
 from bemt.judge.compare.change_document import DIAGNOSED, ComparedRuns, RankedCause, document, next_step, text
-from bemt.judge.compare.matched import stand_run
+from bemt.judge.compare.matched import WITHOUT_SPEED, stand_run
 from bemt.judge.compare.recordings import RunChange
 from bemt.judge.compare.selection import Invocation, conditions_of, selected, with_air
 from bemt.judge.diagnose import by_laws
@@ -152,7 +153,8 @@ def compare(
         said = _diagnosed(said, asked, read, rotor, found, progress)
     return Contrast(found, replace(
         said, recordings=tuple(names), rows={"A": tuple(rows_a), "B": tuple(rows_b)},
-        notes=(*_errors(findings), *_unread(read, names), *said.notes), next_measurement=_next(said, found, asked),
+        notes=(*_errors(findings), *_unread(read, names), *_bare_notes(read), *said.notes),
+        next_measurement=_next(said, found, asked, read),
     ))  # fmt: skip
 
 
@@ -178,8 +180,31 @@ def _read(given: Any, name: str, rows: Sequence[str], air: str | None, option: s
     return with_air(selected(made, list(rows), name), air, option)
 
 
-def _next(said: ComparedRuns, change: RunChange, asked: Invocation) -> Mapping[str, Any]:
-    """Next step, with a command unless it would ask the same again."""
+def _bare(imported: Dataset) -> dict[str, str]:
+    """Voltage and current that a recording has without their units: heading by quantity."""
+    columns = [imported.headings.get(k) or k for k in imported.values if imported.units.get(k) == ""]
+    found = left_open(columns, imported.values)
+    return {q: name for q, name in found.items() if q in ("voltage", "current")}
+
+
+def _bare_notes(read: Sequence[Dataset]) -> list[str]:
+    """Notes on voltage and current that are not used, for want of a unit."""
+    of: dict[str, list[str]] = {}
+    for letter, imported in zip("AB", read, strict=True):
+        if bare := " and ".join(map(repr, _bare(imported).values())):
+            of.setdefault(bare, []).append(letter)
+    return [f"warning in {' and '.join(letters)}: {bare} not used, without a unit" for bare, letters in of.items()]
+
+
+def _next(said: ComparedRuns, change: RunChange, asked: Invocation, read: Sequence[Dataset]) -> Mapping[str, Any]:
+    """Next step, with a command unless it would ask the same again; units that are open come before a speed."""
+    bare = [_bare(imported) for imported in read]
+    if change.without_speed == WITHOUT_SPEED["at_command"] and bare[0].keys() >= {"voltage"} and bare[0] == bare[1]:
+        text = (
+            f"state the unit of {' and '.join(map(repr, bare[0].values()))}: at equal power a battery makes no change"
+        )
+        units = [*asked.stated.get("unit", ()), *(f"{name}=UNIT" for name in bare[0].values())]
+        return {"text": text, "command": asked.command(stated={**asked.stated, "unit": units}), "checks": ""}
     step: Mapping[str, Any] = said.diagnosis["next_measurement"] if said.diagnosis else next_step(change, asked)
     command = [*step["commands"], ""][0] if said.diagnosis else step["command"]
     return {**step, "command": "" if command == asked.command() else command}
