@@ -12,8 +12,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-import numpy as np
-
 from bemt.base.action import Told
 from bemt.base.document import rows_of
 from bemt.base.errors import Fault, InputError, refuse
@@ -31,7 +29,7 @@ from bemt.judge.compare import drive_laws, one_run, two_runs
 from bemt.judge.compare.change_document import DIAGNOSED, ComparedRuns, RankedCause, document, next_step, text
 from bemt.judge.compare.matched import WITHOUT_SPEED, stand_run
 from bemt.judge.compare.recordings import RunChange
-from bemt.judge.compare.selection import Invocation, conditions_of, selected, with_air
+from bemt.judge.compare.selection import Invocation, conditions_of, like_loads, selected, with_air
 from bemt.judge.diagnose import by_laws
 from bemt.judge.diagnose.load import at_once, is_table, load, load_all, unknown_effects
 from bemt.judge.diagnose.record import from_series
@@ -55,8 +53,6 @@ _REMARK = "Before any physics"
 _STUCK = "constant_column"
 # Rows and number of the values of a column that tells parts of one file apart.
 _ROWS, _KINDS = 3, 20
-# Range of speeds, ln, that shows how a column goes with it, powers of a load or its power, and correlation [1].
-_SPAN, _POWERS, _ALIKE = 0.2, (1.5, 3.5), 0.95
 
 
 @dataclass(frozen=True, eq=False)
@@ -296,28 +292,13 @@ def _unread(read: Sequence[Dataset], names: Sequence[str]) -> list[str]:
     known, out = [named(imported) for imported in read], []
     for k, letter in enumerate("AB"):
         lacks = [c.partition("_")[0] for c in ("thrust_N", "torque_Nm") if c in known[1 - k] and c not in known[k]]
-        columns = _like_loads(read[k], known[k]) if lacks else []
+        columns = like_loads(read[k], known[k]) if lacks else []
         if columns:
             how = one_step(names[k], [f"--column {lacks[0]}={shlex.quote(columns[0])}", f"--unit {lacks[0]}=UNIT"])
             goes = f"{' and '.join(map(repr, columns))}, which {'goes' if len(columns) == 1 else 'go'}"
             out.append(f"warning in {letter}: no {' and no '.join(lacks)} is read, which {'BA'[k]} has; not used, "
                        f"without a unit: {goes} with the speed as loads do. State it as in: {how}")  # fmt: skip
     return out
-
-
-def _like_loads(imported: Dataset, known: Dataset) -> list[str]:
-    """Headings of columns without a unit that rise with a power of the speed as loads do, nearest its square first."""
-    out = {}
-    for name, v in imported.values.items():
-        loaded = np.isfinite(v) & (v != 0.0) & (known.rpm > 0.0) if "rpm" in known else np.zeros(v.size, dtype=bool)
-        n = np.log(known.rpm[loaded])
-        if imported.units.get(name) != "" or n.size < _ROWS or np.ptp(n) < _SPAN:
-            continue
-        load = np.log(np.abs(v[loaded]))
-        power = float(np.polyfit(n, load, 1)[0])
-        if _POWERS[0] < power < _POWERS[1] and np.corrcoef(n, load)[0, 1] > _ALIKE:
-            out[imported.headings.get(name, name)] = abs(power - 2.0)
-    return sorted(out, key=lambda k: out[k])
 
 
 def _two_choices(name: str) -> str:
