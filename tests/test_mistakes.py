@@ -109,8 +109,8 @@ RUNS: dict[str, tuple[Callable[[Put], list[str]], int, tuple[str, ...]]] = {
     "a reference to compare": (lambda put: ["compare", put("a.csv", TABLE), "--reference", put("b.csv", TABLE)], 2,
                                ("A is the reference",)),
     "a load under a name of its own": (
-        lambda put: ["diagnose", put("l.csv", TABLE.replace("thrust_N", "th").replace("torque_Nm", "x")), "--case", "mine"],
-        2, ("l.csv", "'th'", "as loads do", "--column thrust=th --unit thrust=UNIT")),
+        lambda put: ["diagnose", "--case", "mine", "--", put("l.csv", TABLE.replace("thrust_N,torque_Nm", "th,x"))], 2,
+        ("l.csv", "'th'", "as loads do", "--column thrust=th --unit thrust=UNIT")),
     "no torque": (lambda put: ["import", put("t.csv", "rpm,thrust_N\n4000,1.1\n6000,2.4\n")], 0, ("thrust_N",)),
 }  # fmt: skip
 
