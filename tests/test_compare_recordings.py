@@ -643,6 +643,23 @@ def test_every_point_that_is_not_compared_is_said_with_its_line_and_why(tmp_path
     assert not [note for note in full.document["notes"] if note.startswith("not compared")]
 
 
+def test_voltage_and_current_without_units_are_asked_for_before_a_speed(tmp_path: Path) -> None:
+    """With them a weaker battery is seen; without, thrust at equal throttle blames the propeller."""
+    files, units = [], {"Voltage": "V", "Current": "A"}
+    for name, k in (("a.csv", 1.0), ("b.csv", 0.925)):
+        x = k * np.linspace(0.3, 1.0, 9)
+        table = {"throttle": np.linspace(30, 100, 9), "grams": 1150.0 * x**2, "Voltage": np.full(9, 16.0 * k)}
+        files.append(written(tmp_path / name, table | {"Current": 42.0 * x**3 / k}))
+    bare = compare(*files)
+    step = bare.document["next_measurement"]
+    assert "warning in A and B: 'Voltage' and 'Current' not used" in bare.text
+    assert "'Voltage' and 'Current'" in step["text"]
+    command = shlex.split(step["command"])
+    assert command[-3:] == ["--unit", "Voltage=UNIT", "Current=UNIT"]
+    stated = bemt.compare(*files, unit=units)
+    assert stated.verdict == "none" and "7.5% less voltage" in " ".join(stated.text.split())
+
+
 def test_options_of_a_pair_are_refused_beside_one_file(tmp_path: Path) -> None:
     a = written(tmp_path / "a.csv", stand(1))
     for given in ({"changed": ["propeller"]}, {"ruled_out": ["duct"]}, {"rows_a": ["rpm=4000:6000"]}, {"air_a": "20C"}):

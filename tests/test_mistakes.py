@@ -102,6 +102,15 @@ RUNS: dict[str, tuple[Callable[[Put], list[str]], int, tuple[str, ...]]] = {
                      ("torque_Nm", "mNm taken for Nm")),
     "no motor": (lambda put: ["drive", "mine"], 2, ("[drive]", "--kv")),
     "pitch without a point": (lambda put: ["drive", "10x100", "--kv", "900", "--cells", "3"], 2, ("Meant 10x10?",)),
+    "no case": (lambda put: ["diagnose", put("a.csv", TABLE), "--reference", put("b.csv", TABLE)], 2,
+                ("--case 10x5", "bemt compare A B")),
+    "three to compare": (lambda put: ["compare", *(put(f"{k}.csv", TABLE) for k in "abc")], 2,
+                         ("c.csv", "bemt diagnose B --reference A1 A2")),
+    "a reference to compare": (lambda put: ["compare", put("a.csv", TABLE), "--reference", put("b.csv", TABLE)], 2,
+                               ("A is the reference",)),
+    "a load under a name of its own": (
+        lambda put: ["diagnose", "--case", "mine", "--", put("l.csv", TABLE.replace("thrust_N,torque_Nm", "th,x"))], 2,
+        ("l.csv", "'th'", "as loads do", "--column thrust=th --unit thrust=UNIT")),
     "no torque": (lambda put: ["import", put("t.csv", "rpm,thrust_N\n4000,1.1\n6000,2.4\n")], 0, ("thrust_N",)),
 }  # fmt: skip
 

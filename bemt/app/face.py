@@ -132,7 +132,8 @@ class Parser(argparse.ArgumentParser):
             unknown = dict.fromkeys(word.partition("=")[0] for word in extra if word.startswith("-"))
             hints = self._hints(unknown)
             words = [f" {', '.join(of)}: {hint}" if len(unknown) > 1 else f" {hint}" for hint, of in hints if hint]
-            words += [" Quotes keep words together."] if not extra[0].startswith("-") else []
+            bare = self.elsewhere.get("", "Quotes keep words together.")
+            words += [f" {bare}"] if not extra[0].startswith("-") else []
             self.error(f"unrecognized arguments: {' '.join(extra)}." + "".join(words))
         return known
 
@@ -157,6 +158,8 @@ class Parser(argparse.ArgumentParser):
             options = [option for action in self._actions for option in action.option_strings]
             typed = [word.partition("=")[0] for word in self._words if word.startswith("--")]
             hints = self._hints(w for w in typed if w not in options)
+            lacking = {self.elsewhere.get(option, "") for option in re.findall(r"--[\w-]+", message)}
+            message += "".join(f". {hint}".rstrip(" .") for hint in sorted(filter(None, lacking)))
             message += "".join(f". Got {', '.join(of)}. {hint}".rstrip(" .") for hint, of in hints)
             message += f"{'.'[message.endswith('?') :]} As in: {self.like}" if self.like else ""
         number = re.match(r"argument (.+?): invalid (number|count|cells) value: '(.*)'$", message)

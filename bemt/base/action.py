@@ -44,7 +44,7 @@ class Declaration:
     shown: bool = False  # among the commands of `bemt --help`; the others stand under `bemt lab`
     elsewhere: Mapping[str, str] = field(
         default_factory=dict
-    )  # quantities, or options, looked for here, and where they are
+    )  # quantities, options or, as "", words too many that are looked for here, and where they are
 
 
 class Answered:

@@ -31,7 +31,8 @@ __all__ = ["calibrate_rotor", "compare", "diagnose", "plan", "prove"]
     "Recordings", "diagnose log.csv --case cases/prop_8x5", words=("recordings",), shown=True,
     common=("case", "reference", "ruled_out", "changed", "only", "rpm", "airspeed_m_s", "out"),
     elsewhere=dict.fromkeys(("--air", "--air-a", "--air-b", "--temperature-C", "--pressure-hPa"), (
-        "State --density-kg-m3 1.19, or temperature_C and pressure_hPa in [air] of the case or of a recording.toml.")),
+        "State --density-kg-m3 1.19, or temperature_C and pressure_hPa in [air] of the case or of a recording.toml."))
+    | {"--case": "A label is one, as --case 10x5; two runs need none: bemt compare A B."},
 )  # fmt: skip
 def diagnose(
     recordings: Recording | Sequence[Recording], case: Propeller | Path | Sequence[Propeller | Path], *,
@@ -133,7 +134,8 @@ def diagnose(
 @action(
     "Recordings", "compare monday.csv tuesday.csv --case cases/prop_8x5", words=("a", "b"), shown=True,
     common=("case", "rows_a", "rows_b", "air_a", "air_b", "ruled_out", "changed", "out"),
-    elsewhere=dict.fromkeys(("--density-kg-m3", "--airspeed-m-s"), "Each run has its own: --air-a 1.19kg/m3,5m/s."),
+    elsewhere=dict.fromkeys(("--density-kg-m3", "--airspeed-m-s"), "Each run has its own: --air-a 1.19kg/m3,5m/s.")
+    | dict.fromkeys(("", "--reference"), "A is the reference; several: bemt diagnose B --reference A1 A2 --case CASE."),
 )  # fmt: skip
 def compare(
     a: Recording, b: Recording | None = None, *, case: Propeller | Path | None = None, label: str | None = None,

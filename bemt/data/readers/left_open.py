@@ -38,15 +38,24 @@ def kept_beside(tables: Sequence[Path]) -> list[str]:
 
 def asked(headings: Sequence[str], channels: Iterable[str]) -> dict[str, str]:
     """Options of ``bemt import``, by quantity, that state the unit of headings whose words are one quantity."""
-    out: dict[str, str] = {}
     names = [label[1:].rsplit("'", 1)[0].split("' (")[0] for label in headings]
+    return {quantity: f"--unit {shlex.quote(name)}=UNIT" for quantity, name in meant(names, channels).items()}
+
+
+def meant(names: Iterable[str], channels: Iterable[str]) -> dict[str, str]:
+    """Headings whose words are one quantity that no other channel is, by quantity.
+
+    >>> meant(["Voltage", "x"], ["thrust_N"])
+    {'voltage': 'Voltage'}
+    """
+    out: dict[str, str] = {}
     channels = {*channels} - {slug(name) for name in names}
     for name in names:
         found = {"rpm"} if surely_shaft_speed(name) else set(meanings(name))
         found -= {"pulse_width"} if "throttle" in found else set()
         quantity = found.pop() if len(found) == 1 else ""
         if quantity and not any(k == quantity or k.startswith(f"{quantity}_") for k in channels):
-            out.setdefault(quantity, f"--unit {shlex.quote(name)}=UNIT")
+            out.setdefault(quantity, name)
     return out
 
 

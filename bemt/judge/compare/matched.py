@@ -507,7 +507,7 @@ def words_of_left_out(channels: Iterable[MatchedChannel]) -> list[str]:
         of: dict[tuple[str, tuple[str, ...]], list[str]] = {}
         for c in channels:
             for one in (k for k in c.left if k.why == why):
-                of.setdefault((one.letter, one.where), []).append(_SHORT.get(c.name, c.name))
+                of.setdefault((one.letter, one.where), []).append(_SHORT.get(c.channel, _SHORT.get(c.name, c.name)))
         both: dict[tuple[tuple[str, ...], tuple[str, ...]], list[str]] = {}
         for (letter, where), own in of.items():
             both.setdefault((where, tuple(own)), []).append(letter)
@@ -519,5 +519,5 @@ def words_of_left_out(channels: Iterable[MatchedChannel]) -> list[str]:
     return out
 
 
-_SHORT = {"electrical": "electrical power", "at_power": "thrust", "at_command": "thrust"}
+_SHORT = {"electrical_power_W": "electrical power", "at_power": "thrust", "at_command": "thrust"}
 """Channels in words, where their name is none."""

@@ -196,6 +196,8 @@ def conditions_of(imported: Dataset) -> tuple[str, ...]:
     return (*texts, *numbers)
 
 
+# Range of speeds, ln, that shows how a column goes with it, powers of a load or its power, and correlation [1].
+_SPAN, _POWERS, _ALIKE, _FEWEST = 0.2, (1.5, 3.5), 0.95, 3
 LOAD_CHANNELS = ("thrust_N", "torque_Nm", "power_W", "CT", "CP", "CQ")
 _UNITS_OF = {"thrust": ("N", "gf"), "torque": ("N m", "N mm"), "power": ("W",)}
 
@@ -279,6 +281,21 @@ def _loads_in_doubt(imported: Dataset, heading: Mapping[str, str], path: str) ->
             hint = "Head it " + " or ".join(f"{heading[name]} ({unit})" for unit in units)
             got, expected = f"a {name} without a unit", "a unit in the heading, or in a recording.toml"
             yield Fault(path, f"column {heading[name]}", got, expected, hint)
+
+
+def like_loads(imported: Dataset, known: Dataset) -> list[str]:
+    """Headings of columns without a unit that rise with a power of the speed as loads do, nearest its square first."""
+    out = {}
+    for name, v in imported.values.items():
+        loaded = np.isfinite(v) & (v != 0.0) & (known.rpm > 0.0) if "rpm" in known else np.zeros(v.size, dtype=bool)
+        n = np.log(known.rpm[loaded])
+        if imported.units.get(name) != "" or n.size < _FEWEST or np.ptp(n) < _SPAN:
+            continue
+        load = np.log(np.abs(v[loaded]))
+        power = float(np.polyfit(n, load, 1)[0])
+        if _POWERS[0] < power < _POWERS[1] and np.corrcoef(n, load)[0, 1] > _ALIKE:
+            out[imported.headings.get(name, name)] = abs(power - 2.0)
+    return sorted(out, key=lambda k: out[k])
 
 
 def wind_of(imported: Dataset) -> float | None:

@@ -12,14 +12,13 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-import numpy as np
-
 from bemt.base.action import Told
 from bemt.base.document import rows_of
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.page import FIRST
 from bemt.base.tables import json_text, write_atomic
 from bemt.base.units import INCH
+from bemt.data.readers.left_open import meant as left_open
 from bemt.data.readers.left_open import one_step
 from bemt.data.recordings.channels import named
 from bemt.data.recordings.check import OPEN_OR_OUT, check, left_out
@@ -28,9 +27,9 @@ from bemt.data.recordings.shown import between_setups, options_of
 from bemt.data.recordings.stated import IGNORED, filled
 from bemt.judge.compare import drive_laws, one_run, two_runs
 from bemt.judge.compare.change_document import DIAGNOSED, ComparedRuns, RankedCause, document, next_step, text
-from bemt.judge.compare.matched import stand_run
+from bemt.judge.compare.matched import WITHOUT_SPEED, stand_run
 from bemt.judge.compare.recordings import RunChange
-from bemt.judge.compare.selection import Invocation, conditions_of, selected, with_air
+from bemt.judge.compare.selection import Invocation, conditions_of, like_loads, selected, with_air
 from bemt.judge.diagnose import by_laws
 from bemt.judge.diagnose.load import at_once, is_table, load, load_all, unknown_effects
 from bemt.judge.diagnose.record import from_series
@@ -52,8 +51,6 @@ if TYPE_CHECKING:
 _STUCK = "constant_column"
 # Rows and number of the values of a column that tells parts of one file apart.
 _ROWS, _KINDS = 3, 20
-# Range of speeds, ln, that shows how a column goes with it, powers of a load or its power, and correlation [1].
-_SPAN, _POWERS, _ALIKE = 0.2, (1.5, 3.5), 0.95
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +147,8 @@ def compare(
         said = _diagnosed(said, asked, read, rotor, found, progress)
     return Contrast(found, replace(
         said, recordings=tuple(names), rows={"A": tuple(rows_a), "B": tuple(rows_b)},
-        notes=(*_errors(findings), *_unread(read, names), *said.notes), next_measurement=_next(said, found, asked),
+        notes=(*_errors(findings), *_unread(read, names), *_bare_notes(read), *said.notes),
+        next_measurement=_next(said, found, asked, read),
     ))  # fmt: skip
 
 
@@ -176,8 +174,31 @@ def _read(given: Any, name: str, rows: Sequence[str], air: str | None, option: s
     return with_air(selected(made, list(rows), name), air, option)
 
 
-def _next(said: ComparedRuns, change: RunChange, asked: Invocation) -> Mapping[str, Any]:
-    """Next step, with a command unless it would ask the same again."""
+def _bare(imported: Dataset) -> dict[str, str]:
+    """Voltage and current that a recording has without their units: heading by quantity."""
+    columns = [imported.headings.get(k) or k for k in imported.values if imported.units.get(k) == ""]
+    found = left_open(columns, imported.values)
+    return {q: name for q, name in found.items() if q in ("voltage", "current")}
+
+
+def _bare_notes(read: Sequence[Dataset]) -> list[str]:
+    """Notes on voltage and current that are not used, for want of a unit."""
+    of: dict[str, list[str]] = {}
+    for letter, imported in zip("AB", read, strict=True):
+        if bare := " and ".join(map(repr, _bare(imported).values())):
+            of.setdefault(bare, []).append(letter)
+    return [f"warning in {' and '.join(letters)}: {bare} not used, without a unit" for bare, letters in of.items()]
+
+
+def _next(said: ComparedRuns, change: RunChange, asked: Invocation, read: Sequence[Dataset]) -> Mapping[str, Any]:
+    """Next step, with a command unless it would ask the same again; units that are open come before a speed."""
+    bare = [_bare(imported) for imported in read]
+    if change.without_speed == WITHOUT_SPEED["at_command"] and bare[0].keys() >= {"voltage"} and bare[0] == bare[1]:
+        text = (
+            f"state the unit of {' and '.join(map(repr, bare[0].values()))}: at equal power a battery makes no change"
+        )
+        units = [*asked.stated.get("unit", ()), *(f"{name}=UNIT" for name in bare[0].values())]
+        return {"text": text, "command": asked.command(stated={**asked.stated, "unit": units}), "checks": ""}
     step: Mapping[str, Any] = said.diagnosis["next_measurement"] if said.diagnosis else next_step(change, asked)
     command = [*step["commands"], ""][0] if said.diagnosis else step["command"]
     return {**step, "command": "" if command == asked.command() else command}
@@ -269,28 +290,13 @@ def _unread(read: Sequence[Dataset], names: Sequence[str]) -> list[str]:
     known, out = [named(imported) for imported in read], []
     for k, letter in enumerate("AB"):
         lacks = [c.partition("_")[0] for c in ("thrust_N", "torque_Nm") if c in known[1 - k] and c not in known[k]]
-        columns = _like_loads(read[k], known[k]) if lacks else []
+        columns = like_loads(read[k], known[k]) if lacks else []
         if columns:
             how = one_step(names[k], [f"--column {lacks[0]}={shlex.quote(columns[0])}", f"--unit {lacks[0]}=UNIT"])
             goes = f"{' and '.join(map(repr, columns))}, which {'goes' if len(columns) == 1 else 'go'}"
             out.append(f"warning in {letter}: no {' and no '.join(lacks)} is read, which {'BA'[k]} has; not used, "
                        f"without a unit: {goes} with the speed as loads do. State it as in: {how}")  # fmt: skip
     return out
-
-
-def _like_loads(imported: Dataset, known: Dataset) -> list[str]:
-    """Headings of columns without a unit that rise with a power of the speed as loads do, nearest its square first."""
-    out = {}
-    for name, v in imported.values.items():
-        loaded = np.isfinite(v) & (v != 0.0) & (known.rpm > 0.0) if "rpm" in known else np.zeros(v.size, dtype=bool)
-        n = np.log(known.rpm[loaded])
-        if imported.units.get(name) != "" or n.size < _ROWS or np.ptp(n) < _SPAN:
-            continue
-        load = np.log(np.abs(v[loaded]))
-        power = float(np.polyfit(n, load, 1)[0])
-        if _POWERS[0] < power < _POWERS[1] and np.corrcoef(n, load)[0, 1] > _ALIKE:
-            out[imported.headings.get(name, name)] = abs(power - 2.0)
-    return sorted(out, key=lambda k: out[k])
 
 
 def _two_choices(name: str) -> str:

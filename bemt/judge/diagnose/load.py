@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
+import shlex
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -17,13 +18,14 @@ from bemt.base.errors import Fault, InputError, gathered, refuse
 from bemt.base.packed import part_of
 from bemt.base.tables import few
 from bemt.base.units import ZERO_CELSIUS
+from bemt.data.readers.left_open import one_step
 from bemt.data.recordings.cfd_run import is_run, of_rotor, run_at
 from bemt.data.recordings.cfd_setup import one_grid, stated_setup
 from bemt.data.recordings.channels import file_name, named, stated
 from bemt.data.recordings.check import check, left_out, without_current
 from bemt.data.recordings.grids import are_grids, together
 from bemt.data.recordings.reduce import reduce, reduction
-from bemt.judge.compare.selection import LOAD_CHANNELS, one_rotor, speed_in_doubt, wind_of
+from bemt.judge.compare.selection import LOAD_CHANNELS, like_loads, one_rotor, speed_in_doubt, wind_of
 from bemt.judge.diagnose import record as records
 from bemt.judge.diagnose.record import Record
 from bemt.physics import effects
@@ -94,6 +96,7 @@ def load(
     found = tuple(f"{Path(path).name}: {f}" for f in findings if f.severity != "note")
     imported = left_out(imported, findings)
     rows = named(imported)
+    _load_missing(imported, rows, path)
     # in the log of a stand the sign is the hand of the rotor; in somebody's own table it may be a slip
     log = imported.format != "table"
     hand = log and any(f.id == "sign_flipped" and f.severity == "note" for f in findings)
@@ -117,6 +120,15 @@ def load(
     declared = {k: units[name] for k in rows.values if (name := file_name(rows, k)) in units}
     return replace(made, findings=found, contradictions=broken, notes=notes, declared=declared,
                    computed=imported.kind == "cfd" or bool(setup), setup=setup, whole=imported)  # fmt: skip
+
+
+def _load_missing(imported: Dataset, rows: Dataset, path: str) -> None:
+    """Refuse a recording without a load, with the columns that may be one."""
+    if not set(LOAD_CHANNELS) & rows.values.keys() and (columns := like_loads(imported, rows)):
+        step = one_step(path, [f"--column thrust={shlex.quote(columns[0])}", "--unit thrust=UNIT"])
+        goes = f"{' and '.join(map(repr, columns))} {'goes' if len(columns) == 1 else 'go'} with the speed as loads do"
+        hint = f"{goes}. If it is the thrust: {step}"
+        raise InputError(Fault(path, "", "no load with a unit", "a thrust or a torque", hint))
 
 
 def _speed_missing(imported: Dataset, path: str) -> None:
