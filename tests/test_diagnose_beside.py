@@ -59,7 +59,8 @@ def test_two_recordings_that_agree_name_nothing_however_far_they_are_off_the_cas
     a, b = (written(tmp_path / f"{k}.csv", k, level=0.12) for k in (1, 2))
     found = asked(capsys, a, b)
     assert not found["effects"], found["headline"]
-    assert main(["diagnose", b, "--reference", a, "--case", str(ROOT / "cases" / "prop_10x5")]) == EXIT_OK
+    case = str(ROOT / "cases" / "prop_10x5")
+    assert main(["diagnose", b, "--reference", a, "--case", case, "--details"]) == EXIT_OK
     said = " ".join(capsys.readouterr().out.split())
     assert "this rotor?" not in said, "the reference shows the rotor"
     assert said.count("The case is not this rotor (reference: ") == 1

@@ -23,8 +23,8 @@ from bemt.judge.diagnose.record import merged
 from bemt.judge.explanation import CHANGED, DOUBT, NONE, UNKNOWN, Explanation, KindPrior
 from bemt.physics import effects
 from bemt.physics.dataset import Dataset
+from bemt.physics.effects import base as effect_base
 from bemt.physics.effects.air_density import AirDensity
-from bemt.physics.effects.base import FORM
 from bemt.physics.effects.duct import DuctEffect
 
 if TYPE_CHECKING:
@@ -179,7 +179,7 @@ def _law_share(found: Evidence) -> float:
 
     The solver is off by what it lacks of the reference, laws by their form.
     """
-    solver, law = found.solver_error**2, sum(w * f**2 for f, w in FORM.items())
+    solver, law = found.solver_error**2, sum(w * f**2 for f, w in effect_base.FORM.items())
     return solver / (solver + law)
 
 
