@@ -18,6 +18,7 @@ import pytest
 
 import bemt
 from bemt.base.arguments import declared
+from bemt.physics.dataset import from_pandas
 from bemt.physics.effects import catalogue, source_of
 from bemt.rotors.case import load_case
 from bemt.rotors.case.prepare import prepare_case
@@ -460,6 +461,23 @@ def test_one_thing_is_a_sequence_of_it_and_what_fits_no_parameter_is_refused(tmp
         bemt.choose(8.0, 3, labels="10x4.5", kv=900.0, out=tmp_path / "taken")
     with pytest.raises(bemt.InputError, match="^motors: got DataFrame"):
         bemt.choose(8.0, 3, motors=FRAME)
+
+
+def test_a_frame_with_the_speed_as_its_index_is_the_same_frame() -> None:
+    """As after ``set_index("rpm")``: without it the speed would be that of the case."""
+    weak = FRAME.assign(thrust_N=0.9 * FRAME.thrust_N)
+    plain, indexed = bemt.compare(FRAME, weak), bemt.compare(FRAME.set_index("rpm"), weak.set_index("rpm"))
+    assert plain.document["ratios"] == indexed.document["ratios"]
+    assert from_pandas(FRAME.set_index("rpm")).rpm.tolist() == FRAME.rpm.tolist()
+    assert from_pandas(FRAME.rename_axis("sample")).labels == ()
+    one, whole = bemt.compare(FRAME, case="10x5"), bemt.compare(FRAME.set_index("rpm"), case="10x5")
+    assert one.document["points"] == whole.document["points"] and len(one.document["points"]) == len(FRAME)
+    for call, words in (
+        (lambda: bemt.propeller("10x5").solve(FRAME), "One column of it"),
+        (lambda: bemt.compare(FRAME, FRAME.iloc[:0]), "^B: got no rows"),
+    ):
+        with pytest.raises(bemt.InputError, match=words):
+            call()
 
 
 def test_frames_are_compared_as_files_are(tmp_path: Path) -> None:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import difflib
 import functools
-import html
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -63,6 +62,8 @@ class Answered:
 
     def _repr_html_(self) -> str:
         """Show the answer in a notebook."""
+        from bemt.base.notebook import as_html
+
         head = repr(self)[1:-1] if type(self).__repr__ is not object.__repr__ else ""
         return as_html(head, str(self))
 
@@ -131,8 +132,6 @@ def worded(function: Callable[P, T], checked: bool = False) -> Callable[P, T]:
     cells = tuple(name for name, kind in kinds.items() if "Cells" in kind)
     counts = (*cells, *(name for name, kind in kinds.items() if "Count" in kind))
     choices = {name: found for name, kind in kinds.items() if (found := choices_of(kind))}
-    usual = dict(zip(reversed(names[: code.co_argcount]), reversed(function.__defaults__ or ()), strict=False))
-    usual |= function.__kwdefaults__ or {}
 
     @functools.wraps(function)
     def call(*args: P.args, **more: P.kwargs) -> T:
@@ -146,9 +145,8 @@ def worded(function: Callable[P, T], checked: bool = False) -> Callable[P, T]:
             near = did_you_mean(unknown[0], names) or f" It takes {', '.join(n for n in names if n != 'self')}."
             raise TypeError(f"{function.__name__}() got {unknown[0]!r}.{near}")
         given = dict(zip(names, args, strict=False)) | more
-        given = {name: usual.get(name) if value is None else value for name, value in given.items()}
         given |= {name: cells_of(given[name]) for name in cells if name in given}
-        given = as_declared(given, kinds) if checked else given
+        given = as_declared(given, kinds, function) if checked else given
         first: Any = (*(given[name] for name in names[: len(args)]), *args[len(names) :])
         named: Any = {name: given[name] for name in more}
         check_counts(counts, given)
@@ -295,23 +293,3 @@ def options_of(fault: Fault) -> Fault:
     if not words or not re.fullmatch(r"[a-z]\w*(, [a-z]\w*)*", words) or words in ("label", "recordings", "points"):
         return fault
     return replace(fault, where=re.sub(r"\w+", lambda m: "--" + m[0].replace("_", "-"), words))
-
-
-# Answers as a notebook shows them.
-def as_html(head: str, text: str) -> str:
-    """A heading and a text of fixed width, for notebooks.
-
-    >>> as_html("a < b", "text")
-    '<strong>a &lt; b</strong><pre style="line-height:1.35">text</pre>'
-    """
-    return f'<strong>{html.escape(head)}</strong><pre style="line-height:1.35">{html.escape(text)}</pre>'
-
-
-def table_html(head: str, rows: Mapping[str, str]) -> str:
-    """A heading and names with their values, for notebooks.
-
-    >>> table_html("10x5", {"blades": "2"})
-    '<strong>10x5</strong><table class="bemt"><tr><th>blades</th><td>2</td></tr></table>'
-    """
-    cells = "".join(f"<tr><th>{html.escape(k)}</th><td>{html.escape(v)}</td></tr>" for k, v in rows.items())
-    return f'<strong>{html.escape(head)}</strong><table class="bemt">{cells}</table>'

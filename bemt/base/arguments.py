@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import os
-from collections.abc import Iterator, Mapping, Set
+from collections.abc import Callable, Iterator, Mapping, Set
 from numbers import Real
 from typing import Any
 
@@ -18,13 +19,18 @@ _PATHS = ("Path", "File", "StrPath", "str | os.PathLike[str]")
 """Annotations of the path of a file or folder."""
 
 
-def as_declared(given: Mapping[str, Any], kinds: Mapping[str, str]) -> dict[str, Any]:
-    """Arguments by name, as the annotations of the same names have them; all faults at once."""
+def as_declared(
+    given: Mapping[str, Any], kinds: Mapping[str, str], function: Callable[..., Any]
+) -> dict[str, Any]:  # fmt: skip
+    """Arguments of a function by name, as its annotations have them, None as the default; all faults at once."""
     faults: list[Fault] = []
     out = dict(given)
+    usual = {k: p.default for k, p in inspect.signature(function).parameters.items() if p.default is not p.empty}
     for name in (k for k in kinds if k in given):
         with gathered(faults):
-            out[name] = declared(name, kinds[name], given[name])
+            out[name] = (
+                usual[name] if given[name] is None and name in usual else declared(name, kinds[name], given[name])
+            )
     refuse(faults)
     return out
 

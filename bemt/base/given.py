@@ -17,11 +17,12 @@ __all__ = ["number", "numbers", "path_text"]
 
 def numbers(name: str, value: Any, finite: bool = True) -> Array:
     """One or more numbers from a caller; unless finite, infinite ones are left to who knows the range."""
-    wrong = Fault("", name, f"{type(value).__name__} {value!r:.60}", "a number, or several")
+    hint = "One column of it, as frame['rpm']" if hasattr(value, "columns") else ""
+    wrong = Fault("", name, f"{type(value).__name__} {' '.join(repr(value).split()):.60}", "a number, or several", hint)
     try:
         raw = np.asarray(value)
         kind, words = raw.dtype.kind, (str, bytes, bool)
-        if kind in "USTbMc" or (kind == "O" and any(isinstance(v, words) for v in raw.flat)):
+        if hint or kind in "USTbMc" or (kind == "O" and any(isinstance(v, words) for v in raw.flat)):
             raise TypeError  # numpy would read "6000" and True as numbers, and 6000+1j as 6000
         found = np.asarray(raw, dtype=float)
     except (TypeError, ValueError):

@@ -218,7 +218,7 @@ def compare(
 
     if diameter_m is not None and not 0.01 <= number("diameter_m", diameter_m) <= 10.0:
         raise InputError(Fault("", "diameter_m", f"{diameter_m:g}", "0.01 to 10 m", "Is that in mm? Divide by 1000"))
-    one = a if b is not None and is_table(a) else path_text("a", a)
+    one = a if is_table(a) else path_text("a", a)
     two = b if b is None or is_table(b) else path_text("b", b)
     return contrast.compared(
         one, two, case, label=label, diameter_m=diameter_m, rows_a=rows_a, rows_b=rows_b, air_a=air_a, air_b=air_b,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bemt.base.action import in_words_of_the_library, table_html, worded
+from bemt.base.action import in_words_of_the_library, worded
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.given import number, numbers, path_text
 from bemt.base.tables import number_of
@@ -69,6 +69,8 @@ class Propeller:
 
     def _repr_html_(self) -> str:
         """Show it in a notebook: size, operating point, declared unknowns."""
+        from bemt.base.notebook import table_html
+
         head = f"{'fan' if self.case.ducted else 'propeller'} {self.name}"
         size = {"diameter": f"{self.diameter_m:.4g} m", "blades": f"{self.blades}"}
         point = f"{self.case.rpm:g} rev/min, {self.case.airspeed_m_s:g} m/s"

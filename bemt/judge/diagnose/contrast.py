@@ -171,6 +171,8 @@ def _read(given: Any, name: str, rows: Sequence[str], air: str | None, option: s
         made = filled(from_pandas(told, name=name) if hasattr(told, "columns") else cast(Dataset, told), run.get("rpm"))
     else:
         made = one_as_stated(name, run)
+    if not len(made):
+        raise InputError(Fault(name, "", "no rows", "two points or more"))
     return with_air(selected(made, list(rows), name), air, option)
 
 
@@ -222,7 +224,9 @@ def compared(
             hint = f"Two set-ups of this file: {pair}" if inside else "Two recordings, A B, need none"
             raise InputError(Fault("--case", "", "one recording and no case", "the case to compare it with", hint))
         typed = "" if is_table(a) else os.fspath(a)
-        one = one_run.compare_run(as_stated([a], run or {})[0], case, progress, file=typed)
+        given = as_stated([a], run or {})[0]
+        given = from_pandas(given) if hasattr(given, "columns") else given
+        one = one_run.compare_run(given, case, progress, file=typed)
         found = Told(one.document(), one_run.text(one), one_run.text(one, details=True))
     elif not tables and (runs := two_runs.compare_runs(a, b, rows_a, rows_b, run or {})) is not None:
         refuse(_unused(of_two, "two runs of CFD, of which no cause is named"))

@@ -93,7 +93,7 @@ def from_pandas(frame: pd.DataFrame, kind: str = "bench", name: str = "table", *
     Returns
     -------
     Dataset
-        With the index as labels, unless it only counts.
+        With the index as labels, unless it only counts or its name is that of a channel, as after ``set_index("rpm")``.
 
     Raises
     ------
@@ -109,6 +109,8 @@ def from_pandas(frame: pd.DataFrame, kind: str = "bench", name: str = "table", *
     """
     import pandas as pd
 
+    own = {k for k in frame.index.names if isinstance(k, str) and not channel_fault(k)} - {*frame.columns}
+    frame = frame.reset_index([*own]) if own else frame
     faults: list[Fault] = []
     values: dict[str, Array] = {}
     u: dict[str, Array] = {}
