@@ -762,7 +762,7 @@ def test_rows_that_were_exchanged_are_left_out_and_said(tmp_path: Path) -> None:
     wrong = some[1] | {k: some[1][k][order] for k in ("thrust_N", "torque_Nm")}
     answer = compare(written(tmp_path / "a.csv", some[0]), written(tmp_path / "b.csv", wrong))
     said = " ".join(answer.text.split())
-    assert answer.verdict == "none" and said.count("were the loads of lines 5 and 8 exchanged?") == 2
+    assert answer.verdict == "none" and said.count("torque alike; were the loads of lines 5 and 8 exchanged?") == 1
     assert all(abs(answer.document["ratios"][k]["ratio"] - 1.0) < 0.03 for k in ("thrust_N", "torque_Nm"))
 
 

@@ -15,13 +15,14 @@ from bemt import __version__
 from bemt.base.document import Documented
 from bemt.base.tables import or_null, text_table
 from bemt.base.unit_errors import speed_ratios
+from bemt.data.recordings.check import LEFT_OUT
 from bemt.judge.compare import recordings
 from bemt.judge.compare import sentences as say
 from bemt.judge.compare.drive_laws import FAMILY, SUPPLY, Judgement, check_of, title_of
 from bemt.judge.compare.matched import LOADS, OVER_COMMAND, WITHOUT_SPEED
 from bemt.judge.compare.recordings import IN_WIND, NO_SPEED, NOTHING_SHARED, OTHER_STAND, REVERSED, RunChange
 from bemt.judge.compare.selection import Invocation
-from bemt.judge.compare.sizes import titled
+from bemt.judge.compare.sizes import READ, titled
 from bemt.judge.compare.smooth_change import Ratio
 from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation, Size
 from bemt.judge.loss import BESIDE, CLAIMS, ON_ONE, SPREAD, checks_by_worth, minutes, ways
@@ -316,8 +317,9 @@ def _said(doc: ComparedRuns) -> list[str]:
     """Sentences on loads, cause, what speaks against it, and the next step with its command."""
     text, command = (doc.next_measurement.get(k) for k in ("text", "command"))
     told = doc.told if doc.diagnosis and doc.told else _causes(doc)
-    out = [*say.seen(doc.ratios, "B against A"), *_of_density(doc.density), *told, *_of_miscount(doc), *_of_drive(doc),
-           *_of_files(doc), *([f"Next: {text}."] if text else [])]  # fmt: skip
+    left = [w for w in _wrong(doc, recordings.ERROR_IN[1]) if w.kind in LEFT_OUT]
+    out = [*say.left_out(left), *say.seen(doc.ratios, "B against A"), *_of_density(doc.density), *told,
+           *_of_miscount(doc), *_of_drive(doc), *_of_files(doc), *([f"Next: {text}."] if text else [])]  # fmt: skip
     if command and "CASE" in command.split():
         out.append("  with a case of this rotor, or its label, the solver weighs the causes:")
     elif command and (checked := doc.next_measurement.get("checks")):
@@ -325,21 +327,27 @@ def _said(doc: ComparedRuns) -> list[str]:
     return [line for words in (*out, *([f"  {command}"] if command else [])) for line in say.wrapped(words)]
 
 
+def _wrong(doc: ComparedRuns, start: str) -> list[say.Wrong]:
+    """Notes with such a start, in their parts."""
+    out = []
+    for note in (n for n in doc.notes if n.startswith(start)):
+        where, _, rest = note.removeprefix(start).partition(": ")
+        kind, _, words = rest.partition(": ")
+        channel = next((c for c in READ if words.startswith(f"{c}: ")), "")
+        evidence, _, fix = words.removeprefix(f"{channel}: ").partition("; ")
+        told = (evidence, fix) if kind in LEFT_OUT else (words.removeprefix(f"{channel}: "), "")
+        out.append(say.Wrong(where, kind, *told, channel=channel))
+    return out
+
+
 def _of_files(doc: ComparedRuns) -> list[str]:
-    """What cannot be so in A or B, and what the files leave out."""
-    wrong, warned = [], []
-    for note in doc.notes:
-        if note.startswith(recordings.ERROR_IN[0]):
-            where, kind, words = note.removeprefix(recordings.ERROR_IN[0]).split(": ", 2)
-            wrong.append(
-                say.Wrong(where, kind, words.removeprefix("thrust_N: ").removeprefix("torque_Nm: "), channel=words)
-            )
-        elif note.startswith(recordings.ERROR_IN):
-            warned.append(f"{note[0].upper()}{note[1:]}.")
+    """What cannot be so in A or B, and what the files leave open."""
+    wrong = _wrong(doc, recordings.ERROR_IN[0])
     wrong = [w._replace(both=any(w.kind == v.kind and w.where != v.where for v in wrong)) for w in wrong]
     first = next(iter(doc.ranking), None)
     cause = {first.effect: first.parameters} if first and doc.effects[:1] == (first.effect,) else {}
-    return [*say.of_files(wrong, cause), *warned]
+    warned = [n for n in doc.notes if n.startswith(recordings.ERROR_IN[1]) and n.split(": ", 2)[1] not in LEFT_OUT]
+    return [*say.of_files(wrong, cause), *(f"{note[0].upper()}{note[1:]}." for note in warned)]
 
 
 def _of_density(density: Densities) -> list[str]:

@@ -219,6 +219,16 @@ class Wrong(NamedTuple):
     channel: str = ""
 
 
+def left_out(found: Sequence[Wrong]) -> list[str]:
+    """Readings that the checks left out, once where several channels say the same of their rows."""
+    told: dict[tuple[str, str], list[Wrong]] = {}
+    for wrong in found:
+        told.setdefault((wrong.where, wrong.correction), []).append(wrong)
+    return [f"Left out in {where}: {READ.get(first.channel, first.channel)} {first.evidence}"
+            f"{''.join(f', {READ.get(w.channel, w.channel)} alike' for w in more)}; {fix.partition('; ')[0]}."
+            for (where, fix), (first, *more) in told.items()]  # fmt: skip
+
+
 def of_files(found: Sequence[Wrong], cause: Mapping[str, Found]) -> list[str]:
     """What the files say of the cause: that it explains what cannot be so in them, or what it leaves to be mended.
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from bemt import __version__
 from bemt.base.tables import or_null, text_table
 from bemt.data.recordings.channels import AS_ELECTRICAL, AS_SHAFT
+from bemt.data.recordings.check import LEFT_OUT
 from bemt.judge.compare import sentences as say
 from bemt.judge.compare.drive_laws import title_of
 from bemt.judge.compare.sizes import in_words, of_largest, sized, titled
@@ -230,18 +231,25 @@ def _odds(told: Size) -> str:
     return " [" + ", ".join(f"{v if isinstance(v, str) else f'{v:.3g}'} {p:.2f}" for v, p in odds) + "]"
 
 
-def _files(d: Diagnosis) -> list[str]:
-    """What the files contradict or lose."""
-    problem = d.problem
-    question, wrong, rest = other_rotor.finding(problem), [], []
+def _wrong(d: Diagnosis) -> tuple[list[say.Wrong], list[str]]:
+    """What looks wrong in the recordings of the test in its parts, and what else is said of them."""
+    problem, question, wrong, rest = d.problem, other_rotor.finding(d.problem), [], []
     known = [f for p in problem.parts if p.record.reference for f in p.record.findings]
     shared, claim = {m[2] for m in map(_FINDING.fullmatch, known) if m}, d.said.verdict in CLAIMS
     for f in (f for f in problem.findings if f not in known):
         if m := _FINDING.fullmatch(f):
-            wrong.append(say.Wrong(m[1], m[2], m[4], "" if claim else m[5], m[2] in shared, m[3]))
+            fix = "" if claim and m[2] not in LEFT_OUT else m[5]
+            wrong.append(say.Wrong(m[1], m[2], m[4], fix, m[2] in shared, m[3]))
         elif f != question or not other_rotor.foreign(problem):
             rest.append(f"In the file: {f}.")
-    cause = {i: d.parameters.get(i, {}) for i in d.said.leading} if claim else {}
+    return wrong, rest
+
+
+def _files(d: Diagnosis) -> list[str]:
+    """What the files contradict or lose."""
+    problem, (wrong, rest) = d.problem, _wrong(d)
+    wrong = [w for w in wrong if w.kind not in LEFT_OUT]
+    cause = {i: d.parameters.get(i, {}) for i in d.said.leading} if d.said.verdict in CLAIMS else {}
     found = [*say.of_files(wrong, cause), *rest]
     if left := found[_FINDINGS:]:
         found[_FINDINGS - 1 :] = [f"{found[_FINDINGS - 1]} And {len(left)} more; `import` shows all."]
@@ -253,7 +261,8 @@ def _left_open(d: Diagnosis) -> list[str]:
     marks = [NO_SPEED, AS_ELECTRICAL, POWER_OPEN]
     if d.said.verdict != "none" and abs(d.problem.level.get("torque_Nm", 0.0)) > LEVEL:
         marks.append(AS_SHAFT)
-    return [f"In the file: {note}." for note in d.problem.notes if any(mark in note for mark in marks)]
+    open_ = (f"In the file: {note}." for note in d.problem.notes if any(mark in note for mark in marks))
+    return [*open_, *say.left_out([w for w in _wrong(d)[0] if w.kind in LEFT_OUT])]
 
 
 def _reference_off(d: Diagnosis) -> list[str]:

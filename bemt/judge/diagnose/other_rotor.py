@@ -19,6 +19,7 @@ from bemt.base.arrays import Array
 from bemt.base.gaussian.evidence import LinearTerms, log_sum
 from bemt.base.tables import number_of, number_text
 from bemt.base.units import INCH
+from bemt.data.recordings.check import LEFT_OUT
 from bemt.judge.diagnose.blade import AS_BUILT, LABELLED, AsLabelled
 from bemt.judge.diagnose.form import ALIKE
 from bemt.judge.diagnose.nuisance import blade_tangents
@@ -377,7 +378,9 @@ def to_mend(problem: Problem) -> str:
     if _suspicious(levels(problem)):
         return "check that the case describes this rotor, and look at the file"
     file, _, correction = contradiction(problem)
-    return f"correct {file} before any run: {correction}" if file else ""
+    # rows that were left out are why the rest looks impossible
+    odd = next((f.partition(". Correction: ")[2] for f in problem.findings if f": {LEFT_OUT[0]} (" in f), "")
+    return f"correct {file} before any run: {odd.partition('; ')[0] or correction}" if file else ""
 
 
 def contradiction(problem: Problem) -> tuple[str, str, str]:
