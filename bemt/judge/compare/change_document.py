@@ -360,7 +360,8 @@ def _of_density(density: Densities) -> list[str]:
 def _of_miscount(doc: ComparedRuns) -> list[str]:
     """The commonest miscount of the speed that moves the loads as they moved, where that is a likely cause."""
     likely = [r.effect for r in doc.ranking if r.probability >= _GUESS]
-    if doc.diagnosis or "rpm_scale" not in (*doc.effects, *likely):
+    told = any("factor" in r.parameters for r in doc.ranking[:1])  # the answer says its ratio
+    if doc.diagnosis or told or "rpm_scale" not in (*doc.effects, *likely):
         return []
     r = next((r for r in doc.ratios.values() if r.kind == "thrust"), None)
     low, high = (r.high95**-0.5, r.low95**-0.5) if r else (math.inf, 0.0)
