@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.units import KNOT, MPH, RPM, ZERO_CELSIUS, split_suffix
-from bemt.data.readers.headings import counts_electrical, may_be_shaft_speed, surely_shaft_speed
+from bemt.data.readers.headings import counts_electrical, heading, may_be_shaft_speed, surely_shaft_speed
 from bemt.data.recordings.cfd_run import WHICH, is_run
 from bemt.data.recordings.channels import MEASURED, asks, in_one_step, moves, named, names_of
 from bemt.data.recordings.findings import zero_thrust_speed
@@ -289,7 +289,9 @@ def like_loads(imported: Dataset, known: Dataset) -> list[str]:
     for name, v in imported.values.items():
         loaded = np.isfinite(v) & (v != 0.0) & (known.rpm > 0.0) if "rpm" in known else np.zeros(v.size, dtype=bool)
         n = np.log(known.rpm[loaded])
-        if imported.units.get(name) != "" or n.size < _FEWEST or np.ptp(n) < _SPAN:
+        said = heading(imported.headings.get(name, name))
+        bare = imported.units.get(name) == "" and said.unit is None and not said.doubt
+        if not bare or n.size < _FEWEST or np.ptp(n) < _SPAN:
             continue
         load = np.log(np.abs(v[loaded]))
         power = float(np.polyfit(n, load, 1)[0])
