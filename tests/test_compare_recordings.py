@@ -24,9 +24,9 @@ from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.data.recordings.check import check
 from bemt.data.recordings.load import import_file
-from bemt.judge.compare import first_picture
+from bemt.judge.compare import first_picture, recordings
 from bemt.judge.compare.change_document import document, text
-from bemt.judge.compare.drive_laws import LAWS
+from bemt.judge.compare.drive_laws import LAWS, Judgement
 from bemt.judge.compare.first_picture import picture
 from bemt.judge.compare.matched import StandRun, stand_run
 from bemt.judge.compare.recordings import RunChange
@@ -34,6 +34,8 @@ from bemt.judge.compare.smooth_change import Ratio
 from bemt.judge.diagnose.by_laws import changed
 from bemt.judge.diagnose.contrast import Contrast, compare
 from bemt.judge.diagnose.law_rotor import CoefficientCurve
+from bemt.judge.explanation import DOUBT, NONE, Explanation
+from bemt.judge.loss import decide
 from bemt.physics.dataset import Dataset
 from bemt.physics.effects import catalogue
 
@@ -1062,3 +1064,15 @@ def test_the_same_thrust_per_watt_at_another_voltage_is_said_first(tmp_path: Pat
     step = answer.document["next_measurement"]
     assert ("repeat B with the battery" in step["text"]) is bool(words)
     assert not words or step["command"] == f"bemt compare {files[0]} B_AGAIN.csv"
+
+
+def test_probabilities_of_loads_and_drive_are_not_one_list(tmp_path: Path) -> None:
+    """Loads of another rotor or file, and a drive as it was: what is ranked adds up to one."""
+    tables = stand(1), stand(2)
+    for table in tables:
+        table["throttle"] = np.linspace(0.3, 0.9, 17)
+    a, b = (stand_run(import_file(written(tmp_path / f"{k}.csv", t)), k) for k, t in zip("ab", tables, strict=True))
+    P = {DOUBT: 0.84, Explanation.of("thrust_zero"): 0.1, NONE: 0.06}
+    change = recordings.changed(a, b, math.nan, lambda _: Judgement.of(decide(P), P))
+    assert change.drive.ranked and change.leading.by == "files"
+    assert sum(change.leading.ranked.values()) == pytest.approx(1.0)

@@ -205,7 +205,7 @@ class RunChange:
         P, Q = parts(self.loads.ranked, self.drive.ranked)
         loads, drive = self.with_density(decide(P)).reasoned_as(self.loads), decide(Q).reasoned_as(self.drive)
         said = joined(loads, drive, P.get(NONE, 0.0))
-        P = {"model": P, "drive": Q}.get(said.by, P | Q)
+        P = {"drive": Q, "both": P | Q}.get(said.by, P)
         sizes = {**self.loads.parameters, **self.drive.parameters}
         return Judgement.of(said, P, sizes, self.loads.full_scale, self.loads.sizes)
 
