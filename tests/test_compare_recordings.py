@@ -654,7 +654,7 @@ def test_voltage_and_current_without_units_are_asked_for_before_a_speed(tmp_path
         files.append(written(tmp_path / name, table | {"Current": 42.0 * x**3 / k}))
     bare = compare(*files)
     step = bare.document["next_measurement"]
-    assert "warning in A and B: 'Voltage' and 'Current' not used" in bare.text
+    assert "Warning in A and B: 'Voltage' and 'Current' not used" in " ".join(bare.text.split())
     assert "'Voltage' and 'Current'" in step["text"]
     command = shlex.split(step["command"])
     assert command[-3:] == ["--unit", "Voltage=UNIT", "Current=UNIT"]

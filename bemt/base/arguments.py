@@ -38,6 +38,7 @@ def as_declared(
 def declared(name: str, kind: str, value: Any) -> Any:
     """One of them; what an annotation leaves open stays.
 
+    >>> import numpy as np
     >>> declared("off", "Sequence[str]", "duct"), declared("rpm", "float | None", np.array(6000.0))
     (['duct'], 6000.0)
     >>> declared("label", "str | None", 5)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from bemt.base.action import Cells, Count, Told, action
 
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from bemt.rotors.case.estimate import RotorEstimate
     from bemt.rotors.case.sources import Sources
     from bemt.rotors.propeller import Propeller
+
+    Recorded = str | os.PathLike[str] | Any  # a file or folder, or its table: Dataset or DataFrame
 
 __all__ = ["calibrate", "cite", "estimate", "measured_rotors", "new", "stations", "validate"]
 
@@ -355,8 +357,7 @@ def validate(
 
 @action("Models and checks", "calibrate uiuc --out calibration", words=("files",))
 def calibrate(
-    files: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = (), *,
-    test: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = (), label: str | None = None,
+    files: Recorded | Sequence[Recorded] = (), *, test: Recorded | Sequence[Recorded] = (), label: str | None = None,
     out: str | os.PathLike[str] | None = None, progress: Callable[[str], None] | None = None,
 ) -> Told:  # fmt: skip
     """Refit K1/K2 on measured propellers, with intervals and scores.

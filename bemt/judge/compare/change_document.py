@@ -360,11 +360,12 @@ def _of_density(density: Densities) -> list[str]:
 def _of_miscount(doc: ComparedRuns) -> list[str]:
     """The commonest miscount of the speed that moves the loads as they moved, where that is a likely cause."""
     likely = [r.effect for r in doc.ranking if r.probability >= _GUESS]
-    told = any("factor" in r.parameters for r in doc.ranking[:1])  # the answer says its ratio
-    if doc.diagnosis or told or "rpm_scale" not in (*doc.effects, *likely):
+    if doc.diagnosis or "rpm_scale" not in (*doc.effects, *likely):
         return []
     r = next((r for r in doc.ratios.values() if r.kind == "thrust"), None)
     low, high = (r.high95**-0.5, r.low95**-0.5) if r else (math.inf, 0.0)
+    if found := [r.parameters["factor"].value for r in doc.ranking[:1] if "factor" in r.parameters]:
+        low, high = 0.999 * found[0], 1.001 * found[0]  # of the answer
     fits = (m for m in speed_ratios(nearest=Fraction(8, 7)) if low < m.ratio < high)
     return [f"A miscount of {m.true}/{m.set} fits: in B, {m.words}; or the inverse in A." for m in fits][:1]
 
