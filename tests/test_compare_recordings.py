@@ -659,7 +659,7 @@ def test_voltage_and_current_without_units_are_asked_for_before_a_speed(tmp_path
     command = shlex.split(step["command"])
     assert command[-3:] == ["--unit", "Voltage=UNIT", "Current=UNIT"]
     stated = bemt.compare(*files, unit=units)
-    assert stated.verdict == "none" and "7.5% less voltage" in " ".join(stated.text.split())
+    assert stated.verdict == "none" and "7.5 % less voltage" in " ".join(stated.text.split())
 
 
 def test_options_of_a_pair_are_refused_beside_one_file(tmp_path: Path) -> None:
