@@ -197,10 +197,12 @@ def both(
     >>> found = both({one: 0.5, own: 0.5}, {one: 0.2, two: 0.8}, 0.5)
     >>> [round(found[k], 2) for k in (one, two, own)]
     [0.3, 0.2, 0.5]
+    >>> round(both({one: 0.8, own: 0.2}, {DOUBT: 1.0, one: 0.0}, 0.5)[one], 6)
+    0.8
     """
     known = frozenset[str]().union(*(k.ids for k in laws))
     beyond = {k: p for k, p in P.items() if not k.ids <= known}
-    heard = 1.0 - laws.get(DOUBT, 0.0)  # two recordings that are no pair tell nothing
+    heard = max(1.0 - laws.get(DOUBT, 0.0), 1e-12)  # two recordings that are no pair tell nothing
     share *= heard
     by_laws = beyond | {k: (1.0 - sum(beyond.values())) * p / heard for k, p in laws.items() if not k.doubt}
     open_, by_solver = P.get(UNKNOWN, 0.0), {UNKNOWN: 0.0, **P}
