@@ -1076,3 +1076,10 @@ def test_probabilities_of_loads_and_drive_are_not_one_list(tmp_path: Path) -> No
     change = recordings.changed(a, b, math.nan, lambda _: Judgement.of(decide(P), P))
     assert change.drive.ranked and change.leading.by == "files"
     assert sum(change.leading.ranked.values()) == pytest.approx(1.0)
+
+
+def test_a_load_that_is_nothing_but_one_reading_is_not_weighed(tmp_path: Path) -> None:
+    a, b = stand(1), stand(2)
+    b["torque_Nm"] = np.r_[0.02, 1e-9, np.full(15, np.nan)]
+    answer = compare(written(tmp_path / "a.csv", a), written(tmp_path / "b.csv", b))
+    assert set(answer.document["ratios"]) == {"thrust_N"}

@@ -155,7 +155,8 @@ def as_driven(candidate: Candidate, pair: RunChange, problem: Problem) -> Candid
 def records_of(pair: RunChange) -> tuple[Record, Record] | None:
     """Both recordings with the same channels, A as reference, in the air that both tell."""
     a, b, diameter_m = pair.a, pair.b, pair.diameter_m
-    channels = _channels_of(a, b)
+    # what is near zero throughout has no scatter, and is no load
+    channels = {q: c for q, c in _channels_of(a, b).items() if q.partition("_")[0] in pair.rotor.likelier}
     if not channels:
         return None
     log_ratio, unsure = density_change(a, b)
