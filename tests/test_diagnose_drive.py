@@ -63,6 +63,15 @@ def test_another_supply_is_named_beside_a_reference(reference: Record, factor: f
     assert said.systems["air"]["verdict"] == "none"
 
 
+def test_a_pulse_at_which_the_reference_does_not_turn_is_not_compared(reference: Record) -> None:
+    """Another controller turns at 0.9 ms, where the curve of the reference goes through zero."""
+    short = run(2)
+    short.extra["pwm_s"][0] = 0.0009
+    said = chain.diagnose([short, reference], [case()])
+    assert said.drive is not None and np.isfinite(said.drive.problem.f0).all()
+    assert min(said.drive.problem.covariates["rpm"]) > 0.0
+
+
 def test_a_recorded_voltage_needs_no_look_and_no_guess() -> None:
     """A voltmeter tells what lost voltage is worth: its shares are no parameters, and nobody is sent to read it."""
     before = replace(run(1, volts=16.0), reference=True)

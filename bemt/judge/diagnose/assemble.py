@@ -362,7 +362,8 @@ def _covariates(parts: Sequence[Part]) -> dict[str, Array]:
 
     def turns(p: Part) -> Array:
         """Speed as a variable: where it is what was measured, that of the drive, or its own noise would follow it."""
-        return p.steady_rpm if p.channels == CHANNELS[2:] else p.flow.rpm
+        driven = p.steady_rpm if p.channels == CHANNELS[2:] else p.flow.rpm
+        return np.where(np.isfinite(driven), driven, p.flow.rpm)
 
     found = {
         "rpm": join(turns),

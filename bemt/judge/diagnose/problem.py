@@ -150,9 +150,13 @@ class Part:
 
     @cached_property
     def steady_rpm(self) -> Array:
-        """Baseline of the drive: speed over the pulse width, of the reference where there is one [rev/min]."""
+        """Baseline of the drive: speed over the pulse width, of the reference where there is one [rev/min].
+
+        NaN at pulses too short for the reference's motor to turn.
+        """
         pulse = self.record.extra["pwm_s"]
-        return (self.drive or SpeedCurve.of(pulse, self.record.measured["rpm"]))(pulse)
+        speed = (self.drive or SpeedCurve.of(pulse, self.record.measured["rpm"]))(pulse)
+        return np.where(speed > 0.0, speed, np.nan)
 
     @cached_property
     def full_scale(self) -> dict[str, float]:
