@@ -8,7 +8,7 @@ over ln n and advance ratio.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.base.tables import some
 from bemt.data.recordings import cfd_setup
 from bemt.data.recordings.channels import THROTTLE_IS_PULSE, in_one_step, moves, named, throttle_of
 from bemt.data.recordings.reduce import reduce, reduction
@@ -260,13 +259,6 @@ class LeftOut(NamedTuple):
     where: tuple[str, ...]  # Lines of the file, or a range
 
 
-WHY_LEFT = {
-    "none": "no number", "zero": "so near zero that they say nothing of the rotor",
-    "beyond": "beyond the range that both have",
-}  # fmt: skip
-"""Why readings are not compared."""
-
-
 @dataclass(frozen=True, eq=False)
 class MatchedChannel:
     """One channel of both recordings."""
@@ -498,26 +490,3 @@ def _beyond(c: MatchedChannel, keep: NDArray[np.bool_]) -> Iterator[LeftOut]:
                 v = np.exp(x[some_, k]) if k == 0 else x[some_, k]
                 ends = dict.fromkeys(f"{end:.{0 if k == 0 else 2}f}" for end in (v.min(), v.max()))
                 yield LeftOut("beyond", letter, (f"{' to '.join(ends)}{unit}",))
-
-
-def words_of_left_out(channels: Iterable[MatchedChannel]) -> list[str]:
-    """A line for each reason for which readings are not compared, with their lines and channels."""
-    out = []
-    for why, words in WHY_LEFT.items():
-        of: dict[tuple[str, tuple[str, ...]], list[str]] = {}
-        for c in channels:
-            for one in (k for k in c.left if k.why == why):
-                of.setdefault((one.letter, one.where), []).append(_SHORT.get(c.channel, _SHORT.get(c.name, c.name)))
-        both: dict[tuple[tuple[str, ...], tuple[str, ...]], list[str]] = {}
-        for (letter, where), own in of.items():
-            both.setdefault((where, tuple(own)), []).append(letter)
-        told = []
-        for (where, names), letters in both.items():
-            at = where[0] if why == "beyond" else f"line{'s' if len(where) > 1 else ''} {some(where, 4)}"
-            told.append(f"{at} of {' and '.join(letters)} ({', '.join(names)})")
-        out += [f"not compared, {words}: {'; '.join(told)}"] if told else []
-    return out
-
-
-_SHORT = {"electrical_power_W": "electrical power", "at_power": "thrust", "at_command": "thrust"}
-"""Channels in words, where their name is none."""

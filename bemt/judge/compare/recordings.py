@@ -21,6 +21,7 @@ from bemt.judge.compare import drive_laws, matched
 from bemt.judge.compare import smooth_change as fits
 from bemt.judge.compare.drive_laws import Judgement, Load
 from bemt.judge.compare.matched import LOADS, MatchedChannel, StandRun, advance, density_change
+from bemt.judge.compare.sentences import words_of_left_out
 from bemt.judge.explanation import CHANGED, NONE, Size
 from bemt.judge.loss import SECOND, Decision, decide, joined, parts
 
@@ -388,7 +389,7 @@ def _notes(
 ) -> list[str]:  # fmt: skip
     other = cfd_setup.other_setup(a.setup, b.setup)
     out = [f"computed otherwise: {other}"] if other else []
-    out += matched.words_of_left_out([*channels.values()])
+    out += words_of_left_out([*channels.values()])
     out += [_misread(letter, run) for letter, run in (("A", a), ("B", b)) if run.misread[0]]
     out += [note for c in channels.values() for note in c.notes]
     out += [

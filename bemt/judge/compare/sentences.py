@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import re
 import textwrap
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from bemt.base.tables import number_text
-from bemt.judge.compare.matched import LOADS, OVER_COMMAND, WITHOUT_SPEED
+from bemt.base.tables import number_text, some
+from bemt.judge.compare.matched import LOADS, OVER_COMMAND, WITHOUT_SPEED, MatchedChannel
 from bemt.judge.compare.sizes import READ, Found
 from bemt.judge.compare.smooth_change import Ratio
 from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation
@@ -22,6 +22,13 @@ WORD = {
 }  # fmt: skip
 NO_CHANGE = "no change, only what two runs differ by"
 """Explanation without a cause where two recordings are compared."""
+WHY_LEFT = {
+    "none": "no number", "zero": "so near zero that they say nothing of the rotor",
+    "beyond": "beyond the range that both have",
+}  # fmt: skip
+"""Why readings are not compared."""
+_SHORT = {"electrical_power_W": "electrical power", "at_power": "thrust", "at_command": "thrust"}
+"""Channels in words, where their name is none."""
 _PERCENT = (0.5, 2.0)  # ratios between these are said in percent
 _PULSE = 0.01  # a command below is a pulse width [s], above a throttle [1]
 _LEAST, _SURE = 0.01, 0.995  # probabilities beyond are not told with two digits
@@ -192,6 +199,25 @@ def _range(r: Ratio) -> str:
     if high - low < 1e-9:
         return "advance ratio {:.2f} to {:.2f}".format(*r.advance_range)
     return f"{math.exp(low):.0f} to {math.exp(high):.0f} rev/min"
+
+
+def words_of_left_out(channels: Iterable[MatchedChannel]) -> list[str]:
+    """A line for each reason for which readings are not compared, with their lines and channels."""
+    out = []
+    for why, words in WHY_LEFT.items():
+        of: dict[tuple[str, tuple[str, ...]], list[str]] = {}
+        for c in channels:
+            for one in (k for k in c.left if k.why == why):
+                of.setdefault((one.letter, one.where), []).append(_SHORT.get(c.channel, _SHORT.get(c.name, c.name)))
+        both: dict[tuple[tuple[str, ...], tuple[str, ...]], list[str]] = {}
+        for (letter, where), own in of.items():
+            both.setdefault((where, tuple(own)), []).append(letter)
+        told = []
+        for (where, names), letters in both.items():
+            at = where[0] if why == "beyond" else f"line{'s' if len(where) > 1 else ''} {some(where, 4)}"
+            told.append(f"{at} of {' and '.join(letters)} ({', '.join(names)})")
+        out += [f"not compared, {words}: {'; '.join(told)}"] if told else []
+    return out
 
 
 def verdict_line(verdict: str, effects: Sequence[str]) -> str:

@@ -87,7 +87,7 @@ def document(d: Diagnosis) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Told:
+class Sentences:
     """Sentences of an answer, in the order in which they are said."""
 
     first: str
@@ -99,12 +99,12 @@ class Told:
     last: list[str]  # What was not tried
 
 
-def told(d: Diagnosis) -> Told:
+def told(d: Diagnosis) -> Sentences:
     """Say the answer."""
     against = [*_files(d), *_of_another_rotor(d), *_level_alone(d), *_reference_off(d), *_of_loads(d),
                *(f"{words[:1].upper()}{words[1:]}." for words in d.problem.no_check)]  # fmt: skip
     details = [*_signs(d), *_beyond(d), *(f"Model: {words}." for words in d.problem.validity), _gain(d)]
-    return Told(headline(d), [*_left_open(d), *_seen(d)], _causes(d), against, details, _next(d), _not_tried(d))
+    return Sentences(headline(d), [*_left_open(d), *_seen(d)], _causes(d), against, details, _next(d), _not_tried(d))
 
 
 def explanation(d: Diagnosis) -> list[str]:
